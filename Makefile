@@ -1,0 +1,38 @@
+# setup, demo and test need Python 3.11 or later, make and the package registries, nothing else.
+PYTHON ?= python3
+BIN := .venv/bin
+INSTALL := $(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt
+
+.PHONY: setup demo test coverage lint clean
+setup: .venv/installed
+
+.venv/installed: pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "droptower needs Python 3.11 or later, this is $$($(PYTHON) --version); name another by: make PYTHON=python3.12" >&2; exit 1; }
+	@echo "setting up .venv (some 150 MB, a minute or two)"
+	$(PYTHON) -m venv .venv
+	$(INSTALL) --editable .
+	@touch $@
+
+.venv/installed-dev: .venv/installed
+	$(INSTALL) --editable '.[dev]'
+	@touch $@
+
+demo: setup
+	$(BIN)/droptower demo
+
+test: .venv/installed-dev
+	$(BIN)/pytest --numprocesses 2 --dist loadgroup
+
+# How often the 95 % intervals of the events hold the truth; docs/method.md quotes it.
+coverage: .venv/installed-dev
+	$(BIN)/python bench/coverage_events.py
+
+lint: .venv/installed-dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/pyright
+	$(BIN)/lint-imports
+
+clean:
+	rm -rf .venv build *.egg-info
