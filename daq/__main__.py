@@ -1,0 +1,78 @@
+"""`python -m daq acquire|recover`: acquisition as a process of its own, its events as JSON lines on stdout.
+
+SIGINT and SIGTERM disarm a recorder that waits for its trigger; a record that has come is read and saved first.
+Exit 0: a run is saved; 1: the last event, `failed`, says why not.
+"""
+
+import argparse
+import contextlib
+import json
+import signal
+import sys
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+from daq.acquisition import acquire
+from daq.errors import AcquisitionError, DaqError
+from daq.lock import RigLock
+from daq.recovery import recover
+from daq.rig import Rig
+from daq.rig_file import load_rig
+from daq.run import now
+from daq.store import Store
+from daq.test_file import load_test
+
+_stop = False
+
+
+def _ask_to_stop(number: int, frame: FrameType | None) -> None:
+    global _stop
+    _stop = True
+
+
+def _emit(event: str, **facts: Any) -> None:
+    with contextlib.suppress(BrokenPipeError):  # who followed has gone; the drop goes on
+        print(json.dumps({"event": event, "at": now(), **facts}), flush=True)
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m daq", description=__doc__)
+    parser.add_argument("do", choices=["acquire", "recover"])
+    parser.add_argument("--rig", type=Path, required=True)
+    parser.add_argument("--test", type=Path, help="needed to acquire")
+    parser.add_argument("--data", type=Path, required=True)
+    parser.add_argument("--series")
+    given = parser.parse_args()
+    if given.do == "acquire" and given.test is None:
+        parser.error("acquire needs --test")
+    return given
+
+
+def _run(given: argparse.Namespace) -> str | None:
+    file, rig_text = load_rig(given.rig)
+    test = load_test(given.test) if given.test is not None else None
+    store = Store(given.data)
+    with RigLock(file, given.do), Rig(file) as rig:
+        if given.do == "recover":
+            return recover(rig, rig_text, test, store, _emit)
+        assert test is not None, "the arguments were checked"
+        return acquire(rig, test[0], (rig_text, test[1]), store, given.series, _emit, lambda: _stop)
+
+
+def main() -> int:
+    given = _arguments()
+    signal.signal(signal.SIGINT, _ask_to_stop)
+    signal.signal(signal.SIGTERM, _ask_to_stop)
+    try:
+        run = _run(given)
+    except DaqError as e:
+        outcome = e.outcome if isinstance(e, AcquisitionError) else type(e).__name__
+        _emit("failed", outcome=outcome, text=str(e))
+        return 1
+    _emit("done", run=run)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

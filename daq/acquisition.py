@@ -1,0 +1,273 @@
+"""One drop: configure, read back, arm, confirm, wait, read, check, write, re-read, and only then release the record."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from daq.errors import AcquisitionError, DeviceError, LinkError, NoReply, StoreError
+from daq.journal import Journal
+from daq.readout import again, read_record
+from daq.recorder import Condition, Counts, Device, GateReading, Header, Interlock, Settings, Status, crc32
+from daq.rig import Rig, wanted_settings
+from daq.rig_file import RigFile
+from daq.run import ChannelData, RunData, new_run_id, now, resolve_g, software
+from daq.store import Store
+from daq.test_file import TestFile
+
+Emit = Callable[..., None]
+"""emit(event, **facts): one event for whoever follows."""
+POLL_S = 0.02
+
+
+def acquire(
+    rig: Rig,
+    test: TestFile,
+    texts: tuple[str, str],
+    store: Store,
+    series: str | None,
+    emit: Emit,
+    stop: Callable[[], bool],
+) -> str:
+    """Take one drop into the store; its run id. `texts` are those of the rig and the test file.
+
+    Raises
+    ------
+    AcquisitionError : no trigger, interlock, aborted, a record that is held or stale, a run that could not be written.
+    LinkError, DeviceError, StoreError : as they say; what the recorder holds it still holds.
+    """
+    device, file = rig.recorder, rig.file
+    wanted = wanted_settings(file)
+    emit("connected", recorder=rig.identity, port=file.recorder.port)
+    _refuse_held(again(device, device.status))
+    store.check_writable(2 * wanted.points * len(file.recorder.channel) + 1_000_000)
+    _configure(device, wanted)
+    emit("configured", sample_rate_Hz=1e9 / wanted.interval_ns, samples=wanted.points, pretrigger=wanted.pretrigger)
+    _check_interlock(rig)
+    run = new_run_id()
+    journal = Journal(store.folder, file.recorder.port)
+    note = {"run": run, "series": series, "rig_text": texts[0], "test_text": texts[1], "identity": rig.identity}
+    note |= {"test": test.model_dump(mode="json", by_alias=True, exclude_none=True), "noted_at": now()}
+    armed = _arm(device, wanted, journal, note, emit)
+    held = _wait(device, armed, wanted, file.recorder.wait_s, stop, emit)
+    if not held:
+        journal.remove()
+        raise AcquisitionError("aborted", "disarmed as asked; no drop was recorded")
+    started = now()
+    header = again(device, device.header)
+    _check_header(header, armed, wanted)
+    return finish(rig, header, test, texts, run, series, started, store, journal, emit)
+
+
+def finish(
+    rig: Rig,
+    header: Header,
+    test: TestFile,
+    texts: tuple[str, str],
+    run: str,
+    series: str | None,
+    started: str,
+    store: Store,
+    journal: Journal,
+    emit: Emit,
+) -> str:
+    """From a held record to a stored run and a released recorder; the run id."""
+    device = rig.recorder
+    emit("reading", run=run, samples=header.points * len(header.crcs))
+    channels = read_record(device, header, lambda done, total: emit("progress", run=run, done=done, total=total))
+    gate = _read_gate(rig, header, emit)
+    if again(device, device.header) != header:
+        raise AcquisitionError("stale", "the recorder's record changed while it was read; it is still held")
+    data = _as_run(rig.file, rig.identity, header, channels, gate, test, texts, run, series, started)
+    try:
+        digest = store.publish(data)
+    except StoreError as e:
+        raise AcquisitionError(
+            "unsaved",
+            f"{e}. The recorder still holds the record: make room, then `droptower recover` with any data folder",
+        ) from None
+    emit("saved", run=run, sha256=digest, samples=header.points, gate_edges=len(gate.edges_ns))
+    release(device, header, emit)
+    journal.remove()
+    return run
+
+
+def release(device: Device, header: Header, emit: Emit) -> None:
+    """Acknowledge a record that is stored. A failure is told, and costs nothing: the record is safe twice."""
+    try:
+        try:
+            device.acknowledge(header.record_id, header.crcs[0])
+        except NoReply:
+            device.resynchronise()  # sent once; the state tells whether it arrived
+        if again(device, device.status).held == header.record_id:
+            raise DeviceError("it still holds the record")
+        emit("released", record_id=header.record_id)
+    except (LinkError, DeviceError) as e:
+        emit("not-released", record_id=header.record_id, text=f"the run is saved, the recorder was not released: {e}")
+
+
+def _refuse_held(status: Status) -> None:
+    if status.held:
+        raise AcquisitionError(
+            "held",
+            f"the recorder still holds record {status.held}, never acknowledged; `droptower recover` saves it",
+        )
+    if status.condition:
+        raise AcquisitionError(
+            "held", f"the recorder is not idle ({status.condition!r}); end what it does, or reset it"
+        )
+
+
+def _configure(device: Device, wanted: Settings) -> None:
+    device.configure(wanted)
+    found = again(device, device.settings)
+    if found != wanted:
+        differ = [k for k in wanted.__dict__ if wanted.__dict__[k] != found.__dict__[k]]
+        told = "; ".join(f"{k}: asked {wanted.__dict__[k]}, got {found.__dict__[k]}" for k in differ)
+        raise DeviceError(f"the recorder does not take its settings: {told}; change them in the rig file")
+
+
+def _check_interlock(rig: Rig) -> None:
+    if rig.interlock is None:
+        return
+    bits = again(rig.interlock, rig.interlock.interlock)
+    if Interlock.DOOR_CLOSED not in bits:
+        raise AcquisitionError("interlock", "the door is open; close it, then arm again")
+    if Interlock.READY not in bits:
+        raise AcquisitionError("interlock", f"the interlock does not allow a drop ({bits!r})")
+
+
+def _arm(device: Device, wanted: Settings, journal: Journal, note: dict[str, Any], emit: Emit) -> Status:
+    """Arm, and confirm by status that it is armed and its pre-trigger memory full."""
+    before = again(device, device.status)
+    journal.write({**note, "boot": before.boot, "record_id": before.last + 1, "config_hash": wanted.config_hash()})
+    try:
+        device.arm()
+    except NoReply:
+        device.resynchronise()  # sent once; the status tells whether it arrived
+    end = time.monotonic() + wanted.pretrigger * wanted.interval_ns * 1e-9 + 2.0
+    while True:
+        status = again(device, device.status)
+        if (status.boot, status.last) != (before.boot, before.last + 1):
+            journal.remove()
+            raise DeviceError(f"the recorder did not arm: it counts record {status.last} at boot {status.boot}")
+        if status.config_hash != wanted.config_hash():
+            device.abort()
+            journal.remove()
+            raise DeviceError("the recorder armed with other settings than were read back; it was disarmed")
+        if not status.condition & Condition.WAITING_FOR_ARM:
+            break
+        if time.monotonic() > end:
+            device.abort()
+            journal.remove()
+            raise DeviceError("the recorder's pre-trigger memory does not fill; it was disarmed")
+        time.sleep(POLL_S / 4)
+    emit("armed", run=note["run"], record_id=status.last, boot=status.boot, text="drop now")
+    return status
+
+
+def _wait(device: Device, armed: Status, wanted: Settings, wait_s: float, stop: Callable[[], bool], emit: Emit) -> bool:
+    """Whether a record came: True once it is held, False if it was stopped before the trigger."""
+    end = time.monotonic() + wait_s
+    measuring = False
+    while True:
+        status = again(device, device.status)
+        if status.boot != armed.boot:
+            raise AcquisitionError("stale", "the recorder was reset while armed: whatever fell was not recorded")
+        if status.held == armed.last:
+            return True
+        if status.condition & Condition.MEASURING and not measuring:
+            measuring = True
+            emit("triggered", record_id=armed.last)
+            end = time.monotonic() + wanted.points * wanted.interval_ns * 1e-9 + 5.0
+        stopped = not measuring and stop()
+        if stopped or time.monotonic() > end:
+            if measuring:
+                raise DeviceError(
+                    "the recorder was triggered and does not finish its record; look at it before any reset"
+                )
+            device.abort()  # does nothing to a record whose trigger has come
+            if not again(device, device.status).condition:
+                if stopped:
+                    return False
+                raise AcquisitionError("no-trigger", f"no trigger in {wait_s:g} s; disarmed, nothing was recorded")
+            end = time.monotonic() + wait_s
+        time.sleep(POLL_S)
+
+
+def _check_header(header: Header, armed: Status, wanted: Settings) -> None:
+    first = wanted.delay_ns - wanted.pretrigger * wanted.interval_ns
+    expected = (armed.last, armed.boot, wanted.config_hash(), wanted.points, wanted.interval_ns, first)
+    found = (
+        header.record_id,
+        header.boot,
+        header.config_hash,
+        header.points,
+        header.interval_ns,
+        header.first_sample_ns,
+    )
+    if found != expected:
+        raise AcquisitionError(
+            "stale", f"the held record is not the one that was armed: {found} for {expected}; still held"
+        )
+
+
+def _read_gate(rig: Rig, header: Header, emit: Emit) -> GateReading:
+    """Edges of this drop; for those of the rebound it waits as long as the rig file says."""
+    none = GateReading(header.record_id, ())
+    if rig.gate is None or rig.file.gate is None:
+        return none
+    end = time.monotonic() + rig.file.gate.wait_s
+    while True:
+        try:
+            reading = again(rig.gate, rig.gate.gate)
+        except LinkError as e:
+            emit("gate-silent", text=f"the gate gives no reading: {e}")
+            return none
+        ours = reading.record_id == header.record_id
+        if (ours and len(reading.edges_ns) >= 4) or time.monotonic() > end:
+            break
+        time.sleep(POLL_S)
+    if not ours or not reading.edges_ns:
+        emit("gate-silent", text="the gate saw nothing of this drop")
+        return none
+    return reading
+
+
+def _as_run(
+    file: RigFile,
+    identity: str,
+    header: Header,
+    channels: list[Counts],
+    gate: GateReading,
+    test: TestFile,
+    texts: tuple[str, str],
+    run: str,
+    series: str | None,
+    started: str,
+) -> RunData:
+    if len(channels) != len(file.recorder.channel):
+        raise DeviceError(f"the record has {len(channels)} channels, the rig file names {len(file.recorder.channel)}")
+    g, g_source = resolve_g(test, file)
+    return RunData(
+        run=run,
+        series=series,
+        started=started,
+        source="acquired",
+        dt=header.interval_ns * 1e-9,
+        channels=[ChannelData(c, s, header.bits) for c, s in zip(file.recorder.channel, channels, strict=True)],
+        test=test,
+        test_text=texts[1],
+        g=g,
+        g_source=g_source,
+        first_sample_ns=header.first_sample_ns,
+        gate_edges_ns=gate.edges_ns,
+        rig=file,
+        rig_text=texts[0],
+        provenance={
+            "software": software(),
+            "recorder": identity,
+            "port": file.recorder.port,
+            "header": header.as_json(),
+            "crc32": [crc32(c) for c in channels],
+        },
+    )

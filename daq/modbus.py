@@ -1,0 +1,143 @@
+"""pymodbus behind one adapter: registers by RTU or TCP, every reply checked, reads and writes apart.
+
+pymodbus breaks its interface in minor releases, returns a device's exceptions instead of raising them, accepts replies
+that are too short, and after an RTU time-out hands out late replies as if they were the next ones. That ends here.
+"""
+
+import logging
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import serial
+from numpy.typing import NDArray
+from pymodbus.client import ModbusSerialClient, ModbusTcpClient
+from pymodbus.exceptions import ModbusException
+from pymodbus.pdu import ModbusPDU
+
+from daq.errors import BadReply, DeviceError, LinkError, NoReply
+
+logging.getLogger("pymodbus").addHandler(logging.NullHandler())
+logging.getLogger("pymodbus").propagate = False  # what it has to say is raised below, in the operator's words
+
+EXCEPTIONS = {
+    1: "function not known",
+    2: "address not known",
+    3: "value not allowed",
+    4: "refused in this state",
+    5: "still working on it",
+    6: "busy",
+    8: "memory parity error",
+    10: "gateway path unavailable",
+    11: "gateway target does not answer",
+}
+PER_READ = 125
+"""Registers a request may read (Modbus application protocol, functions 03 and 04)."""
+
+
+class Modbus:
+    """Registers of one unit.
+
+    Raises
+    ------
+    LinkError : the port is not there or nobody listens.
+    """
+
+    def __init__(self, port: str, baud: int, unit_id: int, timeout_s: float = 1.0) -> None:
+        self.port = port
+        self._unit = unit_id
+        self._rtu = not port.startswith("tcp://")
+        if self._rtu:
+            self._client = ModbusSerialClient(port, baudrate=baud, timeout=timeout_s, retries=0)
+        else:
+            host, _, number = port.removeprefix("tcp://").rpartition(":")
+            if not host or not number.isdigit():
+                raise LinkError(f"port {port} is not tcp://host:port")
+            self._client = ModbusTcpClient(host, port=int(number), timeout=timeout_s, retries=0)
+        self._connect()
+
+    def _connect(self) -> None:
+        try:
+            there = self._client.connect()
+        except (OSError, ModbusException) as e:
+            raise LinkError(f"port {self.port} cannot be opened: {e}") from None
+        if not there:
+            raise LinkError(f"port {self.port} cannot be opened; check the cable and the port in the rig file")
+
+    def _ask(self, what: str, call: Callable[[], ModbusPDU]) -> ModbusPDU:
+        try:
+            if not self._client.connected:
+                self._connect()
+            reply = call()
+        except (ModbusException, OSError, TypeError) as e:
+            # TypeError: pyserial's word for a descriptor that is gone
+            raise NoReply(f"port {self.port}: {what}: {e}") from None
+        if reply.isError():
+            code = getattr(reply, "exception_code", 0)
+            raise DeviceError(f"port {self.port}: {what}: exception {code:02d}, {EXCEPTIONS.get(code, 'unknown')}")
+        return reply
+
+    def _registers(self, what: str, reply: ModbusPDU, count: int) -> list[int]:
+        if len(reply.registers) != count:
+            raise BadReply(f"port {self.port}: {what}: {len(reply.registers)} registers came for {count}")
+        return list(reply.registers)
+
+    def input(self, address: int, count: int) -> list[int]:
+        """`count` input registers, of any number, 125 a request."""
+        found: list[int] = []
+        while len(found) < count:
+            a, n = address + len(found), min(PER_READ, count - len(found))
+            what = f"input registers {a} to {a + n - 1}"
+            reply = self._ask(
+                what, lambda a=a, n=n: self._client.read_input_registers(a, count=n, device_id=self._unit)
+            )
+            found += self._registers(what, reply, n)
+        return found
+
+    def holding(self, address: int, count: int) -> list[int]:
+        """`count` (1 to 125) holding registers."""
+        what = f"holding registers {address} to {address + count - 1}"
+        reply = self._ask(what, lambda: self._client.read_holding_registers(address, count=count, device_id=self._unit))
+        return self._registers(what, reply, count)
+
+    def write(self, address: int, values: Sequence[int]) -> None:
+        """Write holding registers in one request, once."""
+        what = f"writing holding registers {address} to {address + len(values) - 1}"
+        self._ask(what, lambda: self._client.write_registers(address, list(values), device_id=self._unit))
+
+    def drain(self) -> None:
+        """Forget what is under way, so that no late reply is taken for the next one."""
+        if not self._rtu:
+            self._client.close()  # a new connection has no old replies
+            self._connect()
+            return
+        if not self._client.connected:
+            self._connect()
+        line = self._client.socket
+        assert isinstance(line, serial.Serial), "a connected RTU client has its line"
+        old, line.timeout = line.timeout, 0.05
+        try:
+            while line.read(4096):
+                pass
+        except (OSError, TypeError) as e:
+            raise LinkError(f"port {self.port} failed: {e}") from None
+        finally:
+            line.timeout = old
+
+    def close(self) -> None:
+        self._client.close()
+
+
+def join(registers: Sequence[int], signed: bool = False) -> int:
+    """The integer of two or four registers, most significant first."""
+    data = b"".join(r.to_bytes(2, "big") for r in registers)
+    return int.from_bytes(data, "big", signed=signed)
+
+
+def split(value: int, registers: int) -> list[int]:
+    """The registers of an integer, most significant first; a negative one as two's complement."""
+    data = value.to_bytes(2 * registers, "big", signed=value < 0)
+    return [int.from_bytes(data[i : i + 2], "big") for i in range(0, len(data), 2)]
+
+
+def as_int16(registers: Sequence[int]) -> NDArray[np.int16]:
+    return np.array(registers, dtype=np.uint16).view(np.int16)

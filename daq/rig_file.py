@@ -1,0 +1,120 @@
+"""The rig file: recorder, gate and interlock, each with driver, port and settings."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from daq.test_file import Finite, NotNegative, Positive, Table
+from daq.toml_file import parse, read_text
+
+Driver = Literal["scpi", "modbus"]
+
+
+class Port(Table):
+    """A wire. `port` is a device path, `socket://host:port` or `rfc2217://…` (scpi), or `tcp://host:port` (modbus)."""
+
+    driver: Driver
+    port: str
+    baud: Annotated[int, Field(gt=0)] = 115200
+    unit_id: Annotated[int, Field(ge=1, le=247)] = 1
+
+    @model_validator(mode="after")
+    def _port_fits_driver(self) -> "Port":
+        scheme = self.port.partition("://")[0] if "://" in self.port else ""
+        fits = {"scpi": ("", "socket", "rfc2217"), "modbus": ("", "tcp")}[self.driver]
+        if scheme not in fits:
+            wanted = ", ".join(f"{s}://…" if s else "a device path" for s in fits)
+            raise ValueError(f"driver {self.driver!r} takes {wanted} as its port, not {self.port!r}")
+        return self
+
+
+class Channel(Table):
+    """A channel of the recorder: value in `unit` = counts × counts_to_unit + offset."""
+
+    name: str = "CH1"
+    quantity: Literal["force", "acceleration", "displacement"] = "force"
+    unit: str = "N"
+    counts_to_unit: Finite
+    offset: Finite = 0.0
+    range: Positive | None = None
+    time_constant_s: Positive | None = None
+    calibrated_on: str | None = None
+    certificate: str | None = None
+
+    @model_validator(mode="after")
+    def _scale_is_not_zero(self) -> "Channel":
+        if self.counts_to_unit == 0:
+            raise ValueError("counts_to_unit is 0: every sample would be lost")
+        return self
+
+
+class RecorderTable(Port):
+    """`identity`: what the recorder's identity has to contain. `trigger_level`: in the unit of channel 1; if it is not
+    given, 2 % of its range. `wait_s`: how long an armed recorder waits for its trigger."""
+
+    identity: str | None = None
+    sample_rate_Hz: Positive = 1e6
+    samples: Annotated[int, Field(gt=0)] = 5000
+    pretrigger: Annotated[int, Field(ge=0)] = 500
+    trigger_level: Finite | None = None
+    trigger_slope: Literal["POS", "NEG"] = "POS"
+    wait_s: Positive = 120.0
+    channel: Annotated[list[Channel], Field(min_length=1, max_length=4)]
+
+    @model_validator(mode="after")
+    def _window_and_trigger(self) -> "RecorderTable":
+        if self.pretrigger >= self.samples:
+            raise ValueError(f"pretrigger has to be below samples ({self.samples}), not {self.pretrigger}")
+        first = self.channel[0]
+        if first.quantity != "force":
+            raise ValueError(f"channel 1 triggers the recorder and has to be the force, not {first.quantity}")
+        if self.trigger_level is None and first.range is None:
+            raise ValueError("give trigger_level, or the range of channel 1 to take 2 % of")
+        return self
+
+
+class GateTable(Port):
+    """The photodetector. `gap_mm`: from the beam to contact. `edge_mm`, `clock_us`: standard uncertainty of an edge,
+    resolution of its time. `wait_s`: how long after the record the edges of the rebound are waited for."""
+
+    flag_width_mm: Positive
+    gap_mm: NotNegative | None = None
+    edge_mm: NotNegative = 0.03
+    clock_us: Positive = 1.0
+    wait_s: NotNegative = 0.0
+
+
+class InterlockTable(Port):
+    pass
+
+
+class TowerTable(Table):
+    """`mass_kg`: dart masses of this tower by name; `friction_N`: guide friction against the motion."""
+
+    g: Positive | None = None
+    mass_kg: dict[str, Positive] = Field(default_factory=dict)
+    catcher: bool = False
+    friction_N: NotNegative = 0.0
+
+
+class RigFile(BaseModel):
+    """One rig, as its owner wrote it."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    recorder: RecorderTable
+    gate: GateTable | None = None
+    interlock: InterlockTable | None = None
+    tower: TowerTable = Field(default_factory=TowerTable)
+
+
+def load_rig(path: Path) -> tuple[RigFile, str]:
+    """The rig file at `path` and its text.
+
+    Raises
+    ------
+    SettingsError : unknown or missing key, a value outside its limits, not TOML.
+    """
+    text = read_text(path)
+    return parse(text, RigFile, str(path)), text
