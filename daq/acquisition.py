@@ -42,7 +42,7 @@ def acquire(
     store.check_writable(2 * wanted.points * len(file.recorder.channel) + 1_000_000)
     _configure(device, wanted)
     emit("configured", sample_rate_Hz=1e9 / wanted.interval_ns, samples=wanted.points, pretrigger=wanted.pretrigger)
-    _check_interlock(rig)
+    _await_interlock(rig, emit)
     run = new_run_id()
     journal = Journal(store.folder, file.recorder.port)
     note = {"run": run, "series": series, "rig_text": texts[0], "test_text": texts[1], "identity": rig.identity}
@@ -83,7 +83,8 @@ def finish(
     except StoreError as e:
         raise AcquisitionError(
             "unsaved",
-            f"{e}. The recorder still holds the record: make room, then `droptower recover` with any data folder",
+            f"{e}. The recorder still holds the record: make room, then `droptower recover`; "
+            f"for another data folder give it --data and --test",
         ) from None
     emit("saved", run=run, sha256=digest, samples=header.points, gate_edges=len(gate.edges_ns))
     release(device, header, emit)
@@ -126,14 +127,19 @@ def _configure(device: Device, wanted: Settings) -> None:
         raise DeviceError(f"the recorder does not take its settings: {told}; change them in the rig file")
 
 
-def _check_interlock(rig: Rig) -> None:
-    if rig.interlock is None:
+def _await_interlock(rig: Rig, emit: Emit) -> None:
+    if rig.interlock is None or rig.file.interlock is None:
         return
-    bits = again(rig.interlock, rig.interlock.interlock)
-    if Interlock.DOOR_CLOSED not in bits:
-        raise AcquisitionError("interlock", "the door is open; close it, then arm again")
-    if Interlock.READY not in bits:
-        raise AcquisitionError("interlock", f"the interlock does not allow a drop ({bits!r})")
+    end = time.monotonic() + rig.file.interlock.wait_s
+    told = False
+    while Interlock.READY not in (bits := again(rig.interlock, rig.interlock.interlock)):
+        why = "the door is open" if Interlock.DOOR_CLOSED not in bits else "the clamp does not hold the dart"
+        if time.monotonic() >= end:
+            raise AcquisitionError("interlock", f"the interlock does not allow a drop: {why}; mend that, then arm again")
+        if not told:
+            told = True
+            emit("waiting-for-interlock", text=why)
+        time.sleep(POLL_S)
 
 
 def _arm(device: Device, wanted: Settings, journal: Journal, note: dict[str, Any], emit: Emit) -> Status:

@@ -86,7 +86,9 @@ class GateTable(Port):
 
 
 class InterlockTable(Port):
-    pass
+    """The interlock. `wait_s`: how long arming waits for it to allow a drop."""
+
+    wait_s: NotNegative = 0.0
 
 
 class TowerTable(Table):

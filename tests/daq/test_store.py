@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 import pytest
 
+from daq.catalog import Catalog
 from daq.errors import RunNotFound, StoreError
 from daq.export import export_csv, export_nexus
 from daq.importing import import_file
@@ -142,6 +143,18 @@ def test_a_full_disk_is_told_and_leaves_nothing_half_written(small_disk: Path, c
     with pytest.raises(StoreError, match=r"0\.3 MB free; a run may take 3\.0 MB"):
         store.check_writable(3_000_000)
     store.publish(counts_run(cr39, 1000))
+
+
+def test_a_read_only_disk_is_told(small_disk: Path, cr39: Path) -> None:
+    Store(small_disk).publish(counts_run(cr39, 1000))
+    subprocess.run(["mount", "-o", "remount,ro", small_disk], check=True)
+    store = Store(small_disk)
+    with pytest.raises(StoreError, match="Read-only file system"):
+        store.publish(counts_run(cr39, 1000))
+    with pytest.raises(StoreError, match="cannot be written: Read-only file system"):
+        store.check_writable(1000)
+    assert [c.faults for c in store.verify()] == [[]]
+    assert len(Catalog(store).runs()) == 1, "it is listed all the same, from a catalog in memory"
 
 
 def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path, cr39: Path) -> None:

@@ -1,0 +1,1 @@
+"""Joins acquisition and analysis: command line `droptower`, HTTP service and page."""

@@ -1,0 +1,50 @@
+"""The answer of a run: its findings as JSON, made once and kept beside it."""
+
+from importlib.metadata import version
+from typing import Any
+
+from analysis import Kinematics, analyze, kinematics
+from analysis.findings import UNITS
+from api.join import impact_of, record_of
+from daq.run import RunData
+from daq.store import Store
+
+
+def answer_of(store: Store, run: str) -> dict[str, Any]:
+    """The newest answer if this version made it from the raw file as it is now; otherwise a new one, stored.
+
+    Raises
+    ------
+    RunNotFound : no such run.
+    StoreError : its file is damaged, or the answer cannot be written beside it.
+    """
+    made_by = {"droptower": version("droptower"), "raw_sha256": store.sha256(run)}
+    kept = store.analysis(run)
+    if kept is not None and {k: kept.get(k) for k in made_by} == made_by:
+        return kept
+    answer = {**_analysed(store.read(run)), **made_by}
+    store.add_analysis(run, answer)
+    return answer
+
+
+def _analysed(run: RunData) -> dict[str, Any]:
+    head = {"run": run.run, "series": run.series}
+    settings = {"g": run.g, "g_source": run.g_source}
+    try:
+        found: dict[str, Any] = analyze(record_of(run), impact_of(run)).to_json()
+    except Exception as e:  # a run is never dropped because its analysis failed: the answer says that it did
+        found = {
+            "findings": {s: {"value": None, "unit": unit, "u": None} for s, unit in UNITS.items()},
+            "warnings": [
+                {
+                    "code": "analysis-failed",
+                    "text": f"the analysis failed ({type(e).__name__}: {e}); the record is safe",
+                }
+            ],
+        }
+    return {**head, "findings": found["findings"], "fit": None, "warnings": found["warnings"], "settings": settings}
+
+
+def kinematics_of(run: RunData) -> Kinematics:
+    """Force, speed, displacement and energy over the contact of a run; empty where it has none."""
+    return kinematics(record_of(run), impact_of(run))

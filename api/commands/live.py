@@ -1,0 +1,103 @@
+"""Commands on a rig: acquire, recover, sim."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from api.commands.options import Data, Json, RigFileOption, Series, TestFileOption
+from api.commands.show import print_answer, print_json, tell
+
+if TYPE_CHECKING:
+    from api.process import Acquisition
+
+
+def acquire(rig: RigFileOption, test: TestFileOption, data: Data, series: Series = None, as_json: Json = False) -> None:
+    """Arm the rig, take one drop, make it safe, and say what it shows."""
+    from api.process import Acquisition
+
+    _take(Acquisition("acquire", rig, data, test, series), data, as_json)
+
+
+def recover(
+    rig: RigFileOption,
+    data: Data,
+    test: Annotated[
+        Path | None, typer.Option("--test", help="For a record that nobody here armed.", metavar="TEST.toml")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Save the record that a recorder still holds, or release it if it is saved."""
+    from api.process import Acquisition
+
+    _take(Acquisition("recover", rig, data, test), data, as_json)
+
+
+def sim(
+    state: Annotated[Path | None, typer.Option(help="File that keeps record memory and boot counter.")] = None,
+    scenario: Annotated[Path | None, typer.Option(help="TOML file with the rig to play.")] = None,
+    baud: Annotated[int | None, typer.Option(help="Pace the serial lines at this rate.", min=300)] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of its noise.", min=0)] = None,
+) -> None:
+    """Play a rig: SCPI and Modbus on real wires. Prints its endpoints as one JSON line and runs until stopped."""
+    from api.process import become_emulator
+
+    given = {"--state": state, "--scenario": scenario, "--baud": baud, "--seed": seed}
+    become_emulator([part for k, v in given.items() if v is not None for part in (k, str(v))])
+
+
+def _take(acquisition: "Acquisition", data: Path, as_json: bool) -> None:
+    from api.answer import answer_of
+    from daq.store import Store
+
+    try:
+        end = follow(acquisition, as_json)
+    except KeyboardInterrupt:
+        acquisition.abort()
+        tell("disarming; a record that has come is saved first")
+        end = follow(acquisition, as_json, only_new=True)
+    if end["event"] == "failed":
+        tell(f"droptower: {end['text']}")
+        raise typer.Exit(1)
+    if end["run"] is None:
+        tell("the recorder holds no record: nothing was lost, there is nothing to recover")
+        return
+    answer = answer_of(Store(data), end["run"])
+    if as_json:
+        print_json(answer)
+    else:
+        print_answer(answer)
+
+
+def follow(acquisition: "Acquisition", as_json: bool, only_new: bool = False) -> dict[str, Any]:
+    """Show what an acquisition says, with a bar while the record is read; its last event."""
+    import json
+
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    skip = len(acquisition.events) if only_new else 0
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"))
+    end: dict[str, Any] = {}
+    with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True), disable=as_json) as bar:
+        task = None
+        for number, event in enumerate(acquisition):
+            end = event
+            if number < skip:
+                continue
+            if as_json:
+                print(json.dumps(event), file=sys.stderr, flush=True)
+            elif event["event"] == "progress":
+                task = bar.add_task("reading the record", total=event["total"]) if task is None else task
+                bar.update(task, completed=event["done"])
+            elif event["event"] not in ("done", "failed"):
+                bar.console.print(_words(event), highlight=False, markup=False)
+    return end
+
+
+def _words(event: dict[str, Any]) -> str:
+    facts = {k: v for k, v in event.items() if k not in ("event", "at", "text")}
+    told = " ".join(f"{k}={v}" for k, v in facts.items())
+    mark = "ARMED – drop now" if event["event"] == "armed" else event["event"]
+    return f"{mark}  {event.get('text', '') if event['event'] != 'armed' else ''} {told}".replace("  ", " ")

@@ -1,0 +1,12 @@
+"""Options that several commands take."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+Data = Annotated[Path, typer.Option("--data", help="Data folder.", metavar="DIR")]
+Json = Annotated[bool, typer.Option("--json", help="One JSON object a line on stdout; everything else on stderr.")]
+Series = Annotated[str | None, typer.Option("--series", help="Series that the run belongs to.", metavar="NAME")]
+RigFileOption = Annotated[Path, typer.Option("--rig", help="Rig file.", metavar="RIG.toml")]
+TestFileOption = Annotated[Path, typer.Option("--test", help="Test file.", metavar="TEST.toml")]

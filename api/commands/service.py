@@ -1,0 +1,40 @@
+"""Commands that serve: serve, demo."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from api.commands.options import Data
+from api.commands.show import tell
+
+
+def serve(
+    data: Data,
+    rig: Annotated[
+        Path | None, typer.Option("--rig", help="Rig file, to arm from the page.", metavar="RIG.toml")
+    ] = None,
+    host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="Port to listen on; 0 takes a free one.", min=0, max=65535)] = 8000,
+) -> None:
+    """Serve the page and the HTTP interface until Ctrl-C."""
+    from api.http.service import serve as run_service
+    from daq.rig_file import load_rig
+
+    if rig is not None:
+        load_rig(rig)
+    run_service(data, rig, host, port, on_ready=lambda url: tell(f"droptower is on {url} (Ctrl-C ends it)"))
+
+
+def demo(
+    once: Annotated[bool, typer.Option("--once", help="End after the table.")] = False,
+    data: Annotated[Path, typer.Option("--data", help="Data folder.", metavar="DIR")] = Path("demo-data"),
+) -> None:
+    """Play the CR-39 series of the published tests on the emulator, over both wires, and show what is found."""
+    from api.demo import run_demo
+
+    agreed = run_demo(data)
+    if not once:
+        serve(data, None, "127.0.0.1", 8000)
+    if not agreed:
+        raise typer.Exit(1)

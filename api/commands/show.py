@@ -1,0 +1,58 @@
+"""How findings look in a terminal."""
+
+import json
+import sys
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+EDGE = {"m": ("mm", 1e3), "s": ("ms", 1e3), "1": ("", 1.0)}
+"""Units at the edge, and the factor to them."""
+
+
+def print_json(line: dict[str, Any]) -> None:
+    """One line on stdout."""
+    print(json.dumps(line, allow_nan=False), flush=True)
+
+
+def value_with_u(value: float | bool | None, u: float | None, factor: float = 1.0) -> str:
+    """`1.234 ± 0.012`: the uncertainty to two digits, the value to the same place; `–` where there is none."""
+    if value is None:
+        return "–"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    value *= factor
+    if not u:
+        return f"{value:.4g}"
+    u *= factor
+    places = max(0, 1 - _exponent(u))
+    return f"{value:.{places}f} ± {u:.{places}f}"
+
+
+def _exponent(number: float) -> int:
+    return int(f"{number:e}".partition("e")[2])
+
+
+def print_answer(answer: dict[str, Any]) -> None:
+    """Findings and warnings of a run as a table on stdout."""
+    table = Table(title=f"{answer['run']}  {answer['series'] or ''}", title_justify="left")
+    for title in ("symbol", "value ± standard uncertainty", "unit"):
+        table.add_column(title)
+    for symbol, finding in answer["findings"].items():
+        if finding["value"] is None:
+            continue
+        unit, factor = EDGE.get(finding["unit"], (finding["unit"], 1.0))
+        table.add_row(symbol, value_with_u(finding["value"], finding["u"], factor), unit)
+    console = Console()
+    console.print(table)
+    unknown = [s for s, f in answer["findings"].items() if f["value"] is None]
+    if unknown:
+        console.print(f"not known: {', '.join(unknown)}", highlight=False)
+    for warning in answer["warnings"]:
+        console.print(f"! {warning['code']}: {warning['text']}", highlight=False, markup=False)
+
+
+def tell(text: str) -> None:
+    """A line for the operator, on stderr."""
+    print(text, file=sys.stderr, flush=True)

@@ -1,0 +1,191 @@
+"""The demo: P1's CR-39 drops on the emulator, over SCPI and over Modbus, found values beside set and published ones."""
+
+import json
+import socket
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from api.answer import answer_of
+from api.commands.live import follow
+from api.commands.show import value_with_u
+from api.process import Acquisition, Emulator, ProcessError
+from daq.store import Store
+
+DROPS = {
+    # v0 m/s: (E GPa, C_i, C_d), measured and modelled (F_M N, α_M mm, ε published form); P1 Table 1
+    1.39: ((3.30, 8000, 10), (709, 1.28, 0.88), (700, 1.28, 0.90)),
+    1.95: ((3.40, 4500, 10), (1067, 1.77, 0.80), (1045, 1.77, 0.80)),
+    2.80: ((3.42, 5000, 15), (1448, 2.59, 0.81), (1412, 2.61, 0.81)),
+}
+COLUMNS = {
+    "F_M": ("F_M / N", 1.0),
+    "alpha_M": ("α_M / mm", 1e3),
+    "t_c": ("t_c / ms", 1e3),
+    "eps_exact": ("ε exact", 1.0),
+}
+LIMIT_U = 4.0
+"""Deviation, in standard uncertainties, that noise explains: of 24 findings one lies beyond it once in 600 demos."""
+
+TEST_FILE = """[dart]
+mass_kg = 0.503
+tip_radius_mm = 6.35
+
+[specimen]
+id = "CR-39 {v0:.2f} m/s"
+material = "CR-39"
+thickness_mm = 4.6
+nu = 0.30
+
+[support]
+kind = "ring"
+radius_mm = 30
+"""
+
+RIG_FILE = """[recorder]
+driver = "{driver}"
+port = "{port}"
+sample_rate_Hz = 500e3
+samples = 250_000          # 0.5 s: the second contact is in the record
+pretrigger = 1000
+trigger_level = 60         # N
+
+[[recorder.channel]]
+name = "tup"
+counts_to_unit = 0.390625  # N a count: 14 bits over ±3200 N
+range = 3200
+
+[gate]
+driver = "{driver}"
+port = "{port}"
+flag_width_mm = 10
+gap_mm = 20
+wait_s = 0.2
+
+[interlock]
+driver = "{driver}"
+port = "{port}"
+wait_s = 10                # for the dart to come to rest and be clamped again
+"""
+
+
+def run_demo(data: Path) -> bool:
+    """Six drops into `data`, and the table; whether what was found agrees with what the emulator was set to.
+
+    Raises
+    ------
+    ProcessError, DaqError : a drop did not become a run.
+    """
+    console = Console(stderr=True)
+    store = Store(data)
+    found: list[tuple[float, str, dict[str, Any], dict[str, Any]]] = []
+    data.mkdir(parents=True, exist_ok=True)
+    with Emulator("--seed", "39") as rig, Control(rig.endpoints["control"]) as hand:
+        for driver, wire in (("scpi", "scpi_pty"), ("modbus", "modbus_tcp")):
+            rig_file = data / f"demo-rig-{driver}.toml"
+            rig_file.write_text(RIG_FILE.format(driver=driver, port=rig.endpoints[wire]))
+            for v0, (specimen, _, _) in DROPS.items():
+                console.print(f"CR-39 at {v0:.2f} m/s by {driver.upper()} on {rig.endpoints[wire]}", highlight=False)
+                test_file = data / f"demo-test-{v0:.2f}.toml"
+                test_file.write_text(TEST_FILE.format(v0=v0))
+                hand.ask(do="specimen", **dict(zip(("E_GPa", "C_i", "C_d"), specimen, strict=True)))
+                hand.ask(do="height", v0=v0)
+                acquisition = Acquisition("acquire", rig_file, data, test_file, "demo CR-39")
+                truth = _drop(acquisition, hand)
+                end = follow(acquisition, as_json=False)
+                if end["event"] != "done":
+                    raise ProcessError(end["text"])
+                found.append((v0, driver, truth, answer_of(store, end["run"])))
+    return _print_table(found)
+
+
+def _drop(acquisition: Acquisition, hand: "Control") -> dict[str, Any]:
+    """Let go once the recorder is armed; the truth of the drop."""
+    for event in acquisition:
+        if event["event"] == "armed":
+            return hand.ask(do="release")["truth"]
+    raise ProcessError(acquisition.events[-1].get("text", "acquisition ended before it armed"))
+
+
+def _print_table(found: list[tuple[float, str, dict[str, Any], dict[str, Any]]]) -> bool:
+    table = Table(
+        title="CR-39, 0.503 kg on a ring of 30 mm: published, set in the emulator, found", title_justify="left"
+    )
+    for title in ("v0", "", *(t for t, _ in COLUMNS.values()), "ε published"):
+        table.add_column(title, justify="left" if title in ("v0", "") else "right")
+    agreed = True
+    for v0, (_, measured, modelled) in DROPS.items():
+        truth = next(t for v, _, t, _ in found if v == v0)
+        table.add_row(f"{v0:.2f} m/s", "P1, measured", f"{measured[0]}", f"{measured[1]}", "", "", f"{measured[2]:.2f}")
+        note = "*" if v0 == 1.95 else ""
+        table.add_row("", f"P1, model{note}", f"{modelled[0]}", f"{modelled[1]}", "", "", f"{modelled[2]:.2f}")
+        published_form = truth["eps_exact"] + 9.80665 * truth["t_c"] / truth["v0"]
+        table.add_row(
+            "", "set", *(f"{truth[s] * f:.4g}" for s, (_, f) in COLUMNS.items()), f"{published_form:.3f}", style="bold"
+        )
+        for _, driver, truth, answer in (row for row in found if row[0] == v0):
+            cells: list[str] = []
+            for symbol, (_, factor) in COLUMNS.items():
+                finding = answer["findings"][symbol]
+                cell, good = _compare(finding, truth[symbol], factor)
+                agreed &= good
+                cells.append(cell)
+            published = answer["findings"]["eps_published"]
+            table.add_row("", f"found, {driver.upper()}", *cells, value_with_u(published["value"], published["u"]))
+        table.add_section()
+    console = Console()
+    console.width = max(console.width, 118)  # so that no cell is broken where the output is no terminal
+    console.print(table)
+    console.print(
+        "In brackets: (found − set) in standard uncertainties, which hold what the sensor chain's noise (3 N), ringing "
+        "(1 % at 10 kHz), converter (0.39 N) and gate (0.5 % of v0) explain. * P1's 1045 N at 1.95 m/s does not follow "
+        "from its own E, C_i and C_d: a correct solver gives 975 N.",
+        highlight=False,
+    )
+    console.print(
+        f"All {2 * len(DROPS) * len(COLUMNS)} findings agree with the set values within {LIMIT_U:g} u."
+        if agreed
+        else f"[bold]Some findings differ from the set values by more than {LIMIT_U:g} u.[/bold]",
+        highlight=False,
+    )
+    return agreed
+
+
+def _compare(finding: dict[str, Any], truth: float, factor: float) -> tuple[str, bool]:
+    value, u = finding["value"], finding["u"]
+    if value is None or not u:
+        return "not found", False
+    off = (value - truth) / u
+    good = abs(off) <= LIMIT_U
+    return f"{value_with_u(value, u, factor)} ({off:+.1f}){'' if good else ' !'}", good
+
+
+class Control:
+    """The operator's hand at the emulator: one JSON line asked, one answered."""
+
+    def __init__(self, endpoint: str) -> None:
+        host, _, port = endpoint.rpartition("//")[2].rpartition(":")
+        self._socket = socket.create_connection((host, int(port)), timeout=30)
+        self._lines = self._socket.makefile("r", encoding="utf-8")
+
+    def ask(self, **request: Any) -> dict[str, Any]:
+        """The answer to a request.
+
+        Raises
+        ------
+        ProcessError : the emulator refused it.
+        """
+        self._socket.sendall(json.dumps(request).encode() + b"\n")
+        answer = json.loads(self._lines.readline() or '{"ok": false, "error": "the emulator has gone"}')
+        if not answer.get("ok"):
+            raise ProcessError(f"the emulator refused {request}: {answer.get('error')}")
+        return answer
+
+    def __enter__(self) -> "Control":
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._lines.close()
+        self._socket.close()

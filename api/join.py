@@ -1,0 +1,75 @@
+"""From a run file to what analysis takes: arrays and conditions in SI. The one place where settings meet physics."""
+
+import math
+
+import numpy as np
+
+from analysis import GateSetup, Impact, Record
+from daq.run import RunData
+from daq.test_file import Table
+
+
+def record_of(run: RunData) -> Record:
+    """The force record of a run, as the sensor saw it; gate edges on the record's own axis."""
+    force = run.channel("force")
+    assert force is not None, "a run is made with a force channel, or not at all"
+    scale = force.calibration
+    rails = lsb = None
+    if force.bits is not None:
+        half = 2 ** (force.bits - 1)
+        ends = sorted((counts * scale.counts_to_unit + scale.offset) for counts in (-half, half - 1))
+        rails, lsb = (ends[0], ends[1]), abs(scale.counts_to_unit)
+    acceleration = run.channel("acceleration")
+    return Record(
+        force=force.calibrated(),
+        dt=run.dt,
+        rails=rails,
+        lsb=lsb,
+        time_constant=scale.time_constant_s,
+        gate_edges=tuple((e - (run.first_sample_ns or 0)) * 1e-9 for e in run.gate_edges_ns),
+        pretrigger=run.pretrigger,
+        acceleration=None if acceleration is None else np.asarray(acceleration.calibrated()),
+    )
+
+
+def impact_of(run: RunData) -> Impact:
+    """The conditions of a run's impact."""
+    test, rig = run.test, run.rig
+    force = run.channel("force")
+    assert force is not None, "a run is made with a force channel, or not at all"
+    scale = force.calibration
+    gate = rig.gate if rig is not None else None
+    return Impact(
+        mass=test.dart.mass_kg,
+        tip_radius=test.dart.tip_radius_mm * 1e-3,
+        tip_mass=test.dart.tip_mass_kg,
+        thickness=test.specimen.thickness_mm * 1e-3,
+        nu=test.specimen.nu,
+        shape=test.specimen.shape,
+        support=test.support.kind,
+        support_radius=None if test.support.radius_mm is None else test.support.radius_mm * 1e-3,
+        v0=test.drop.v0,
+        u_v0=test.drop.u.get("v0"),
+        height=None if test.drop.height_mm is None else test.drop.height_mm * 1e-3,
+        u_height=_scaled(test.drop, "height_mm", 1e-3),
+        g=run.g,
+        catcher=test.drop.catcher or (rig is not None and rig.tower.catcher),
+        friction=rig.tower.friction_N if rig is not None else 0.0,
+        gate=None
+        if gate is None
+        else GateSetup(
+            flag_width=gate.flag_width_mm * 1e-3,
+            u_flag_width=gate.u.get("flag_width_mm", 0.02) * 1e-3,
+            u_edge=gate.edge_mm * 1e-3,
+            gap=None if gate.gap_mm is None else gate.gap_mm * 1e-3,
+            clock=gate.clock_us * 1e-6,
+        ),
+        u_mass=test.dart.u.get("mass_kg", 0.0),
+        u_tip_mass=test.dart.u.get("tip_mass_kg", 0.0),
+        u_gain=math.fabs(scale.u.get("counts_to_unit", 0.0) / scale.counts_to_unit),
+    )
+
+
+def _scaled(table: Table, key: str, scale: float) -> float | None:
+    u = table.u.get(key)
+    return None if u is None else u * scale
