@@ -17,6 +17,8 @@ from daq.test_file import TestFile
 Emit = Callable[..., None]
 """emit(event, **facts): one event for whoever follows."""
 POLL_S = 0.02
+SETTLE_S = 10.0
+"""Longer than any record takes."""
 
 
 def acquire(
@@ -38,7 +40,7 @@ def acquire(
     device, file = rig.recorder, rig.file
     wanted = wanted_settings(file)
     emit("connected", recorder=rig.identity, port=file.recorder.port)
-    _refuse_held(again(device, device.status))
+    _refuse_held(settle(device, emit))
     store.check_writable(2 * wanted.points * len(file.recorder.channel) + 1_000_000)
     _configure(device, wanted)
     emit("configured", sample_rate_Hz=1e9 / wanted.interval_ns, samples=wanted.points, pretrigger=wanted.pretrigger)
@@ -106,15 +108,30 @@ def release(device: Device, header: Header, emit: Emit) -> None:
         emit("not-released", record_id=header.record_id, text=f"the run is saved, the recorder was not released: {e}")
 
 
+def settle(device: Device, emit: Emit) -> Status:
+    """State of a recorder at rest: one that a dead host left armed is disarmed, one that measures may finish.
+
+    Raises
+    ------
+    DeviceError : it does not come to rest.
+    """
+    status = again(device, device.status)
+    if status.condition & (Condition.WAITING_FOR_ARM | Condition.WAITING_FOR_TRIGGER):
+        emit("disarming", record_id=status.last, text="the recorder was left armed")
+        device.abort()
+    end = time.monotonic() + SETTLE_S
+    while (status := again(device, device.status)).condition & ~Condition.HELD:
+        if time.monotonic() > end:
+            raise DeviceError(f"the recorder does not come to rest ({status.condition!r}); look at it before any reset")
+        time.sleep(POLL_S)
+    return status
+
+
 def _refuse_held(status: Status) -> None:
     if status.held:
         raise AcquisitionError(
             "held",
             f"the recorder still holds record {status.held}, never acknowledged; `droptower recover` saves it",
-        )
-    if status.condition:
-        raise AcquisitionError(
-            "held", f"the recorder is not idle ({status.condition!r}); end what it does, or reset it"
         )
 
 
@@ -135,7 +152,9 @@ def _await_interlock(rig: Rig, emit: Emit) -> None:
     while Interlock.READY not in (bits := again(rig.interlock, rig.interlock.interlock)):
         why = "the door is open" if Interlock.DOOR_CLOSED not in bits else "the clamp does not hold the dart"
         if time.monotonic() >= end:
-            raise AcquisitionError("interlock", f"the interlock does not allow a drop: {why}; mend that, then arm again")
+            raise AcquisitionError(
+                "interlock", f"the interlock does not allow a drop: {why}; mend that, then arm again"
+            )
         if not told:
             told = True
             emit("waiting-for-interlock", text=why)

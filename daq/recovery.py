@@ -2,13 +2,14 @@
 
 from typing import Any
 
-from daq.acquisition import Emit, finish, release
-from daq.errors import AcquisitionError
+from daq.acquisition import Emit, finish, release, settle
+from daq.errors import AcquisitionError, StoreError
 from daq.journal import Journal
 from daq.readout import again
 from daq.recorder import Header
 from daq.rig import Rig
 from daq.run import new_run_id, now
+from daq.run_file import read_provenance
 from daq.store import Store
 from daq.test_file import TestFile
 from daq.toml_file import validate
@@ -22,7 +23,7 @@ def recover(rig: Rig, rig_text: str, test: tuple[TestFile, str] | None, store: S
     AcquisitionError : the held record was armed by nobody this data folder knows, and no test file was given.
     """
     device = rig.recorder
-    status = again(device, device.status)
+    status = settle(device, emit)
     journal = Journal(store.folder, rig.file.recorder.port)
     if not status.held:
         journal.remove()
@@ -60,7 +61,10 @@ def _belongs(note: dict[str, Any], identity: str, header: Header) -> bool:
 def _already_saved(store: Store, identity: str, header: Header) -> str | None:
     wanted = header.as_json()
     for run in reversed(store.runs()):
-        facts = store.read(run).provenance
+        try:
+            facts = read_provenance(store.raw(run))
+        except StoreError:
+            continue  # a damaged run is no proof that the record is safe
         if facts.get("recorder") == identity and facts.get("header") == wanted:
             return run
     return None

@@ -78,10 +78,29 @@ def read(path: Path) -> RunData:
         raise StoreError(f"{path} cannot be read as a run: {e}; `droptower verify` tells what is damaged") from None
 
 
-def _read(f: h5py.File, path: Path) -> RunData:
+def read_provenance(path: Path) -> dict[str, Any]:
+    """Where a run comes from, without its samples.
+
+    Raises
+    ------
+    StoreError : as `read`.
+    """
+    try:
+        with h5py.File(path, "r") as f:
+            return json.loads(_string(_entry(f, path)["provenance/data"]))
+    except (OSError, KeyError, ValueError, RuntimeError) as e:
+        raise StoreError(f"{path} cannot be read as a run: {e}; `droptower verify` tells what is damaged") from None
+
+
+def _entry(f: h5py.File, path: Path) -> Any:
     entry: Any = f[_ENTRY]
     if (found := entry.attrs.get("droptower_format")) != FORMAT:
         raise StoreError(f"{path} is of format {found}, this version reads format {FORMAT}")
+    return entry
+
+
+def _read(f: h5py.File, path: Path) -> RunData:
+    entry = _entry(f, path)
     instrument = entry["instrument"]
     names = sorted(n for n in instrument if n.startswith("channel_"))
     first = instrument[names[0]]

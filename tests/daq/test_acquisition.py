@@ -149,6 +149,16 @@ def test_a_host_killed_between_saving_and_releasing_finds_its_run_saved(tmp_path
         assert Store(data).runs() == [run]
 
 
+def test_a_rig_that_a_dead_host_left_armed_is_disarmed_and_armed_anew(start: Start, emulator: Emulator) -> None:
+    dead = start()
+    dead.until("armed")
+    dead.kill()
+    daq = start()
+    drop(daq, emulator)
+    assert daq.end()["event"] == "done"
+    assert "disarming" in [e["event"] for e in daq.events]
+
+
 def test_a_reset_while_armed_is_told(start: Start, emulator: Emulator) -> None:
     daq = start(wire="modbus_rtu")
     daq.until("armed")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import CR39, half_sine
+from records import CR39, half_sine
 
 from daq.errors import ImportFileError, SettingsError
 from daq.importing import import_file, read_drops

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from conftest import CR39
+from records import CR39
 
 from daq.errors import SettingsError
 from daq.rig_file import load_rig
@@ -16,6 +16,12 @@ trigger_level = 50
 [[recorder.channel]]
 counts_to_unit = 0.1
 """
+
+
+def test_the_examples_in_the_docs_are_valid() -> None:
+    examples = Path(__file__).parents[2] / "docs" / "examples"
+    assert load_test(examples / "cr39.toml")[0].drop.v0 == 1.39
+    assert load_rig(examples / "rig.toml")[0].gate is not None
 
 
 def test_a_good_test_file_keeps_its_uncertainties_by_key(cr39: Path) -> None:
