@@ -2,8 +2,10 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from daq.errors import BadReply, DeviceError, LinkError
-from daq.modbus import Modbus, as_int16, join, split
+from daq.modbus import Modbus, join, split
 from daq.recorder import Condition, Counts, GateReading, Header, Interlock, Settings, Status
 
 WORD_16, WORD_32 = 0x0102, 0x01020304
@@ -18,6 +20,7 @@ class ModbusDevice:
     def __init__(self, port: str, baud: int, unit_id: int) -> None:
         self._bus = Modbus(port, baud, unit_id)
         self._high_first = True
+        self._at_once = 1
         self._window: tuple[int, int] | None = None
 
     def resynchronise(self) -> None:
@@ -29,6 +32,7 @@ class ModbusDevice:
                 f"port {self._bus.port}: the known words read {first:04x} {pair[0]:04x}{pair[1]:04x}, not 0102 01020304"
             )
         self._high_first = pair == [0x0102, 0x0304]
+        self._at_once = min(max(self._bus.input(4, 1)[0], 1), 16)
 
     def _join(self, registers: Sequence[int], signed: bool = False) -> int:
         return join(registers if self._high_first else registers[::-1], signed)
@@ -111,13 +115,15 @@ class ModbusDevice:
         )
 
     def read(self, channel: int, start: int, count: int) -> Counts:
-        registers: list[int] = []
-        while len(registers) < count:
-            at = start + len(registers)
+        out = np.empty(count, dtype=np.uint16)
+        done = 0
+        while done < count:
+            at = start + done
             base = self._turn_page(channel, at)
-            n = min(count - len(registers), WINDOW_SAMPLES - (at - base))
-            registers += self._bus.input(WINDOW + at - base, n)
-        return as_int16(registers)
+            n = min(count - done, WINDOW_SAMPLES - (at - base))
+            out[done : done + n] = self._bus.bulk(WINDOW + at - base, n, self._at_once)
+            done += n
+        return out.view(np.int16)
 
     def _turn_page(self, channel: int, at: int) -> int:
         """First sample of a window that holds sample `at`."""
