@@ -1,6 +1,6 @@
 """Many registers at the wire's own speed: requests in flight at once on TCP, back to back on RTU, every frame checked.
 
-pymodbus keeps one request under way and, on a serial line, sleeps between polls; the framing of a long read is done here
+pymodbus keeps one request under way and, on a serial line, sleeps between polls; a long read is framed here
 on the socket or line that its client has opened.
 """
 
