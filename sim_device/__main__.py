@@ -75,7 +75,7 @@ async def _serve(device: Device, baud: int | None) -> None:
     await stop.wait()
     for server in (scpi, modbus, hand):
         server.close()
-    device.recorder.abort()
+    device.recorder.forget()
     close_links()
     scpi_line.close()
     modbus_line.close()

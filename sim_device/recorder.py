@@ -132,25 +132,29 @@ class Recorder:
         self._log(f"record {record_id}: filling")
 
     def abort(self) -> None:
-        """Filling, armed, measuring → idle."""
+        """Filling, armed → idle. A record whose trigger has come goes on to its end."""
+        if self.state in (State.FILLING, State.ARMED):
+            self._log("acquisition aborted")
+            self.forget()
+
+    def forget(self) -> None:
+        """End whatever is under way, as power loss does; a held record stays."""
         if self._task is not None:
             self._task.cancel()
             self._task = None
+        self.acquisition = None
         if self.state is not State.HELD:
-            if self.state is not State.IDLE:
-                self._log("acquisition aborted")
-                self.acquisition = None
             self.state = State.IDLE
 
     def reset(self) -> None:
-        """``*RST``: settings as after reset, no acquisition; a held record stays."""
+        """``*RST``: settings as after reset, not armed; a record that is measuring or held stays."""
         self.abort()
         self.setup = Setup()
 
     def power_on(self) -> None:
         """After power loss: as new, but for the memory."""
-        self.reset()
-        self.acquisition = None
+        self.forget()
+        self.setup = Setup()
         self.started = time.monotonic_ns()
 
     def acknowledge(self, record_id: int, crc: int) -> None:

@@ -151,3 +151,15 @@ def test_ids_count_every_init_even_one_that_leads_to_nothing(shared_emulator: Em
             scpi.done("INIT")
             assert int(scpi.ask("TRAC:STAT?").split(",")[3]) == last + n
             scpi.done("ABOR")
+
+
+@pytest.mark.parametrize("command", ["ABOR", "*RST"])
+def test_a_record_whose_trigger_has_come_goes_on_to_its_end(shared_emulator: Emulator, command: str):
+    with Scpi(shared_emulator.endpoints["scpi_tcp"]) as scpi:
+        arm(scpi, "SENS:SWE:POIN 500000", "TRIG:LEV 150")
+        shared_emulator.do("release")
+        until(lambda: scpi.condition() == 24)
+        scpi.done(command)
+        assert scpi.condition() == 24
+        until(lambda: scpi.condition() == 256)
+        assert header(scpi)[3] == 500_000
