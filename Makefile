@@ -22,7 +22,7 @@ demo: setup
 	$(BIN)/droptower demo
 
 test: .venv/installed-dev
-	$(BIN)/pytest --numprocesses 2 --dist loadgroup
+	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest --numprocesses 2 --dist loadscope
 
 # How often the 95 % intervals of the events hold the truth; docs/method.md quotes it.
 coverage: .venv/installed-dev

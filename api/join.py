@@ -39,6 +39,8 @@ def impact_of(run: RunData) -> Impact:
     assert force is not None, "a run is made with a force channel, or not at all"
     scale = force.calibration
     gate = rig.gate if rig is not None else None
+    # Where a gate has measured the speed, the test file's is what the operator aimed at.
+    measured = gate is not None and len(run.gate_edges_ns) >= 2
     return Impact(
         mass=test.dart.mass_kg,
         tip_radius=test.dart.tip_radius_mm * 1e-3,
@@ -48,7 +50,7 @@ def impact_of(run: RunData) -> Impact:
         shape=test.specimen.shape,
         support=test.support.kind,
         support_radius=None if test.support.radius_mm is None else test.support.radius_mm * 1e-3,
-        v0=test.drop.v0,
+        v0=None if measured else test.drop.v0,
         u_v0=test.drop.u.get("v0"),
         height=None if test.drop.height_mm is None else test.drop.height_mm * 1e-3,
         u_height=_scaled(test.drop, "height_mm", 1e-3),
