@@ -9,6 +9,8 @@ from api.join import impact_of, record_of
 from daq.run import RunData
 from daq.store import Store
 
+ON_THE_RECORDS_AXIS = ("t_contact", "t_second")
+
 
 def answer_of(store: Store, run: str) -> dict[str, Any]:
     """The newest answer if this version made it from the raw file as it is now; otherwise a new one, stored.
@@ -31,20 +33,25 @@ def _analysed(run: RunData) -> dict[str, Any]:
     head = {"run": run.run, "series": run.series}
     settings = {"g": run.g, "g_source": run.g_source}
     try:
-        found: dict[str, Any] = analyze(record_of(run), impact_of(run)).to_json()
+        record, first = record_of(run)
+        found: dict[str, Any] = analyze(record, impact_of(run)).to_json()
+        for symbol in ON_THE_RECORDS_AXIS:
+            if found["findings"][symbol]["value"] is not None:
+                found["findings"][symbol]["value"] += first * run.dt
     except Exception as e:  # a run is never dropped because its analysis failed: the answer says that it did
+        text = f"the analysis failed ({type(e).__name__}: {e}); the record is safe"
         found = {
             "findings": {s: {"value": None, "unit": unit, "u": None} for s, unit in UNITS.items()},
-            "warnings": [
-                {
-                    "code": "analysis-failed",
-                    "text": f"the analysis failed ({type(e).__name__}: {e}); the record is safe",
-                }
-            ],
+            "warnings": [{"code": "analysis-failed", "text": text}],
         }
+    if run.missing:
+        text = (
+            f"{run.missing} samples could not be had; the findings are those of the stretch around the greatest force"
+        )
+        found["warnings"].insert(0, {"code": "partial-record", "text": text})
     return {**head, "findings": found["findings"], "fit": None, "warnings": found["warnings"], "settings": settings}
 
 
 def kinematics_of(run: RunData) -> Kinematics:
     """Force, speed, displacement and energy over the contact of a run; empty where it has none."""
-    return kinematics(record_of(run), impact_of(run))
+    return kinematics(record_of(run)[0], impact_of(run))

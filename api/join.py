@@ -5,31 +5,45 @@ import math
 import numpy as np
 
 from analysis import GateSetup, Impact, Record
-from daq.run import RunData
+from daq.run import ChannelData, RunData
 from daq.test_file import Table
 
 
-def record_of(run: RunData) -> Record:
-    """The force record of a run, as the sensor saw it; gate edges on the record's own axis."""
+def record_of(run: RunData) -> tuple[Record, int]:
+    """The force record of a run, as the sensor saw it, and the sample of the run that it starts with.
+
+    Of a partial run it is the stretch without gaps that holds the greatest force. Gate edges are on its own axis.
+    """
     force = run.channel("force")
     assert force is not None, "a run is made with a force channel, or not at all"
     scale = force.calibration
+    part = whole_part(force)
+    shift = part.start * run.dt
     rails = lsb = None
     if force.bits is not None:
         half = 2 ** (force.bits - 1)
         ends = sorted((counts * scale.counts_to_unit + scale.offset) for counts in (-half, half - 1))
         rails, lsb = (ends[0], ends[1]), abs(scale.counts_to_unit)
     acceleration = run.channel("acceleration")
-    return Record(
-        force=force.calibrated(),
+    record = Record(
+        force=force.calibrated(part),
         dt=run.dt,
         rails=rails,
         lsb=lsb,
         time_constant=scale.time_constant_s,
-        gate_edges=tuple((e - (run.first_sample_ns or 0)) * 1e-9 for e in run.gate_edges_ns),
-        pretrigger=run.pretrigger,
-        acceleration=None if acceleration is None else np.asarray(acceleration.calibrated()),
+        gate_edges=tuple((e - (run.first_sample_ns or 0)) * 1e-9 - shift for e in run.gate_edges_ns),
+        pretrigger=None if run.pretrigger is None else max(0, run.pretrigger - part.start),
+        acceleration=None if acceleration is None or acceleration.gaps else acceleration.calibrated(part),
     )
+    return record, part.start
+
+
+def whole_part(channel: ChannelData) -> slice:
+    """The stretch without gaps that holds the greatest magnitude."""
+    edges = [0, *(e for start, count in channel.gaps for e in (start, start + count)), len(channel.samples)]
+    stretches = [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b > a]
+    values = channel.calibrated()
+    return max(stretches, key=lambda s: float(np.abs(values[s]).max()))
 
 
 def impact_of(run: RunData) -> Impact:

@@ -25,10 +25,19 @@ class Acquisition:
     `events` holds what it has said so far; iterating follows it to its end, from the first event on.
     """
 
-    def __init__(self, do: str, rig: Path, data: Path, test: Path | None = None, series: str | None = None) -> None:
+    def __init__(
+        self,
+        do: str,
+        rig: Path,
+        data: Path,
+        test: Path | None = None,
+        series: str | None = None,
+        give_up: bool = False,
+    ) -> None:
         command = [sys.executable, "-m", "daq", do, "--rig", str(rig), "--data", str(data)]
         command += ["--test", str(test)] if test is not None else []
         command += ["--series", series] if series is not None else []
+        command += ["--give-up"] if give_up else []
         self.events: list[Event] = []
         self._news = threading.Condition()
         self._ended = False

@@ -43,6 +43,9 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--test", type=Path, help="needed to acquire")
     parser.add_argument("--data", type=Path, required=True)
     parser.add_argument("--series")
+    parser.add_argument(
+        "--give-up", action="store_true", help="release a record of which a partial run is all there is"
+    )
     given = parser.parse_args()
     if given.do == "acquire" and given.test is None:
         parser.error("acquire needs --test")
@@ -55,7 +58,7 @@ def _run(given: argparse.Namespace) -> str | None:
     store = Store(given.data)
     with RigLock(file, given.do), Rig(file) as rig:
         if given.do == "recover":
-            return recover(rig, rig_text, test, store, _emit)
+            return recover(rig, rig_text, test, store, _emit, given.give_up)
         assert test is not None, "the arguments were checked"
         return acquire(rig, test[0], (rig_text, test[1]), store, given.series, _emit, lambda: _stop)
 

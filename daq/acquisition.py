@@ -4,18 +4,16 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from daq.errors import AcquisitionError, DeviceError, LinkError, NoReply, StoreError
+from daq.errors import AcquisitionError, DeviceError, NoReply
+from daq.finish import Emit, finish
 from daq.journal import Journal
-from daq.readout import again, read_record
-from daq.recorder import Condition, Counts, Device, GateReading, Header, Interlock, Settings, Status, crc32
+from daq.readout import again
+from daq.recorder import Condition, Device, Header, Interlock, Settings, Status
 from daq.rig import Rig, wanted_settings
-from daq.rig_file import RigFile
-from daq.run import ChannelData, RunData, new_run_id, now, resolve_g, software
+from daq.run import new_run_id, now
 from daq.store import Store
 from daq.test_file import TestFile
 
-Emit = Callable[..., None]
-"""emit(event, **facts): one event for whoever follows."""
 POLL_S = 0.02
 SETTLE_S = 10.0
 """Longer than any record takes."""
@@ -46,8 +44,8 @@ def acquire(
     emit("configured", sample_rate_Hz=1e9 / wanted.interval_ns, samples=wanted.points, pretrigger=wanted.pretrigger)
     _await_interlock(rig, emit)
     run = new_run_id()
-    journal = Journal(store.folder, file.recorder.port)
-    note = {"run": run, "series": series, "rig_text": texts[0], "test_text": texts[1], "identity": rig.identity}
+    journal = Journal(store.folder, rig.identity)
+    note = {"run": run, "series": series, "rig_text": texts[0], "test_text": texts[1]}
     note |= {"test": test.model_dump(mode="json", by_alias=True, exclude_none=True), "noted_at": now()}
     armed = _arm(device, wanted, journal, note, emit)
     held = _wait(device, armed, wanted, file.recorder.wait_s, stop, emit)
@@ -58,54 +56,6 @@ def acquire(
     header = again(device, device.header)
     _check_header(header, armed, wanted)
     return finish(rig, header, test, texts, run, series, started, store, journal, emit)
-
-
-def finish(
-    rig: Rig,
-    header: Header,
-    test: TestFile,
-    texts: tuple[str, str],
-    run: str,
-    series: str | None,
-    started: str,
-    store: Store,
-    journal: Journal,
-    emit: Emit,
-) -> str:
-    """From a held record to a stored run and a released recorder; the run id."""
-    device = rig.recorder
-    emit("reading", run=run, samples=header.points * len(header.crcs))
-    channels = read_record(device, header, lambda done, total: emit("progress", run=run, done=done, total=total))
-    gate = _read_gate(rig, header, emit)
-    if again(device, device.header) != header:
-        raise AcquisitionError("stale", "the recorder's record changed while it was read; it is still held")
-    data = _as_run(rig.file, rig.identity, header, channels, gate, test, texts, run, series, started)
-    try:
-        digest = store.publish(data)
-    except StoreError as e:
-        raise AcquisitionError(
-            "unsaved",
-            f"{e}. The recorder still holds the record: make room, then `droptower recover`; "
-            f"for another data folder give it --data and --test",
-        ) from None
-    emit("saved", run=run, sha256=digest, samples=header.points, gate_edges=len(gate.edges_ns))
-    release(device, header, emit)
-    journal.remove()
-    return run
-
-
-def release(device: Device, header: Header, emit: Emit) -> None:
-    """Acknowledge a record that is stored. A failure is told, and costs nothing: the record is safe twice."""
-    try:
-        try:
-            device.acknowledge(header.record_id, header.crcs[0])
-        except NoReply:
-            device.resynchronise()  # sent once; the state tells whether it arrived
-        if again(device, device.status).held == header.record_id:
-            raise DeviceError("it still holds the record")
-        emit("released", record_id=header.record_id)
-    except (LinkError, DeviceError) as e:
-        emit("not-released", record_id=header.record_id, text=f"the run is saved, the recorder was not released: {e}")
 
 
 def settle(device: Device, emit: Emit) -> Status:
@@ -234,65 +184,3 @@ def _check_header(header: Header, armed: Status, wanted: Settings) -> None:
         raise AcquisitionError(
             "stale", f"the held record is not the one that was armed: {found} for {expected}; still held"
         )
-
-
-def _read_gate(rig: Rig, header: Header, emit: Emit) -> GateReading:
-    """Edges of this drop; for those of the rebound it waits as long as the rig file says."""
-    none = GateReading(header.record_id, ())
-    if rig.gate is None or rig.file.gate is None:
-        return none
-    end = time.monotonic() + rig.file.gate.wait_s
-    while True:
-        try:
-            reading = again(rig.gate, rig.gate.gate)
-        except LinkError as e:
-            emit("gate-silent", text=f"the gate gives no reading: {e}")
-            return none
-        ours = reading.record_id == header.record_id
-        if (ours and len(reading.edges_ns) >= 4) or time.monotonic() > end:
-            break
-        time.sleep(POLL_S)
-    if not ours or not reading.edges_ns:
-        emit("gate-silent", text="the gate saw nothing of this drop")
-        return none
-    return reading
-
-
-def _as_run(
-    file: RigFile,
-    identity: str,
-    header: Header,
-    channels: list[Counts],
-    gate: GateReading,
-    test: TestFile,
-    texts: tuple[str, str],
-    run: str,
-    series: str | None,
-    started: str,
-) -> RunData:
-    if len(channels) != len(file.recorder.channel):
-        raise DeviceError(f"the record has {len(channels)} channels, the rig file names {len(file.recorder.channel)}")
-    g, g_source = resolve_g(test, file)
-    return RunData(
-        run=run,
-        series=series,
-        started=started,
-        source="acquired",
-        dt=header.interval_ns * 1e-9,
-        channels=[ChannelData(c, s, header.bits) for c, s in zip(file.recorder.channel, channels, strict=True)],
-        test=test,
-        test_text=texts[1],
-        g=g,
-        g_source=g_source,
-        first_sample_ns=header.first_sample_ns,
-        gate_edges_ns=gate.edges_ns,
-        rig=file,
-        rig_text=texts[0],
-        provenance={
-            "software": software(),
-            "recorder": identity,
-            "port": file.recorder.port,
-            "header": header.as_json(),
-            "crc32": [crc32(c) for c in channels],
-        },
-    )

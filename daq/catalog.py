@@ -13,17 +13,17 @@ from daq.store import Store
 _SCHEMA = """
 CREATE TABLE IF NOT EXISTS runs (
     run TEXT PRIMARY KEY, series TEXT, started TEXT, source TEXT, specimen TEXT, material TEXT, batch TEXT,
-    points INTEGER, sample_rate_Hz REAL, sha256 TEXT, fault TEXT
+    points INTEGER, sample_rate_Hz REAL, sha256 TEXT, missing INTEGER, fault TEXT
 );
 CREATE INDEX IF NOT EXISTS by_series ON runs (series, run);
 """
-VERSION = 1
+VERSION = 2
 FILTERS = ("series", "specimen", "material", "batch", "source")
 
 
 @dataclass(frozen=True)
 class Row:
-    """A run as the catalog lists it; `fault` says why its file could not be read."""
+    """A run as the catalog lists it; `missing` samples could not be had, `fault` says why its file cannot be read."""
 
     run: str
     series: str | None
@@ -35,6 +35,7 @@ class Row:
     points: int | None
     sample_rate_Hz: float | None
     sha256: str | None
+    missing: int | None
     fault: str | None
 
 
@@ -106,7 +107,7 @@ class Catalog:
         with db:
             db.executemany("DELETE FROM runs WHERE run = ?", [(r,) for r in known - there])
             rows = self._rows(sorted(there - known))
-            db.executemany(f"INSERT OR REPLACE INTO runs VALUES ({','.join('?' * 11)})", rows)
+            db.executemany(f"INSERT OR REPLACE INTO runs VALUES ({','.join('?' * 12)})", rows)
         return len(there)
 
     def _rows(self, runs: list[str]) -> Iterator[tuple[Any, ...]]:
@@ -114,12 +115,12 @@ class Catalog:
             try:
                 data = self._store.read(run)
             except StoreError as e:
-                yield (run, *[None] * 9, str(e))
+                yield (run, *[None] * 10, str(e))
                 continue
             test = data.test
             yield (
                 run, data.series, data.started, data.source, test.specimen.id, test.specimen.material,
-                test.operator.batch, data.points, 1 / data.dt, self._store.sha256(run), None,
+                test.operator.batch, data.points, 1 / data.dt, self._store.sha256(run), data.missing, None,
             )  # fmt: skip
 
 

@@ -2,62 +2,160 @@
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
 
+from daq.chunks import Chunks
 from daq.errors import BadReply, DeviceError, LinkError
 from daq.recorder import Counts, Device, Header, crc32
 
 CHUNK = 25_000
+PIECE = 1_000
+"""What a chunk that does not come is broken into: a short reply gets through where a long one does not."""
 TRIES = 5
+PIECE_TRIES = 2
+HOPELESS = 8
+"""Pieces in a row that did not come: then the rest is not asked for."""
 
 T = TypeVar("T")
 Progress = Callable[[int, int], None]
 """Called with samples read and samples in all."""
 
 
-def read_record(device: Device, header: Header, progress: Progress) -> list[Counts]:
-    """Samples of all channels of the held record.
+@dataclass(frozen=True)
+class Gap:
+    """Samples of a channel (from 1) that could not be had; they stand as 0 in the record."""
+
+    channel: int
+    start: int
+    count: int
+
+
+@dataclass(frozen=True)
+class Readout:
+    """Samples of all channels, the map of what is missing, and whether the recorder still holds the record."""
+
+    channels: list[Counts]
+    gaps: tuple[Gap, ...]
+    held: bool
+
+    @property
+    def gap_map(self) -> list[list[int]]:
+        """Channel, first sample and number of samples of each gap."""
+        return [[g.channel, g.start, g.count] for g in self.gaps]
+
+
+def read_record(device: Device, header: Header, chunks: Chunks, progress: Progress) -> Readout:
+    """The held record, going on from what `chunks` has of it.
 
     Raises
     ------
-    LinkError : a chunk could not be had in TRIES tries; the record is still held.
+    LinkError : the wire is gone, or nothing at all came; the record is still held and what was read is noted.
     """
-    total = header.points * len(header.crcs)
-    done = 0
-    channels: list[Counts] = []
+    return _read(_Reader(device, header, chunks, progress), header, chunks)
+
+
+def read_noted(header: Header, chunks: Chunks) -> Readout:
+    """What `chunks` has of a record that no recorder holds any more.
+
+    Raises
+    ------
+    LinkError : that is nothing.
+    """
+    return _read(_Reader(None, header, chunks, lambda done, total: None), header, chunks)
+
+
+def _read(reader: "_Reader", header: Header, chunks: Chunks) -> Readout:
+    missing = [span for span in reader.spans(CHUNK) if not reader.take(span, TRIES)]
+    gaps: list[Gap] = []
+    in_a_row = 0
+    for piece in (piece for span in missing for piece in _pieces(span)):
+        came = reader.take(piece, PIECE_TRIES if in_a_row < HOPELESS else 0)
+        in_a_row = 0 if came else in_a_row + 1
+        if not came:
+            gaps.append(piece)
+    if reader.done == 0:
+        raise LinkError(f"nothing of the record could be read: {reader.last}; the recorder still holds it")
     for number, stated in enumerate(header.crcs, 1):
-        samples = np.empty(header.points, dtype=np.int16)
-        for start in range(0, header.points, CHUNK):
-            count = min(CHUNK, header.points - start)
-            samples[start : start + count] = _chunk(device, number, start, count)
-            done += count
-            progress(done, total)
-        if (found := crc32(samples)) != stated:
+        whole = not any(gap.channel == number for gap in gaps)
+        if whole and (found := crc32(reader.channels[number - 1])) != stated:
+            chunks.remove()
             raise BadReply(f"channel {number} has CRC-32 {found:08x}, the recorder states {stated:08x}; still held")
-        channels.append(samples)
-    return channels
+    return Readout(reader.channels, _joined(gaps), reader.held)
 
 
-def _chunk(device: Device, channel: int, start: int, count: int) -> Counts:
-    last: Exception | None = None
-    for attempt in range(TRIES):
+class _Reader:
+    def __init__(self, device: Device | None, header: Header, chunks: Chunks, progress: Progress) -> None:
+        self._device, self._header, self._chunks, self._progress = device, header, chunks, progress
+        self.channels = [np.zeros(header.points, dtype=np.int16) for _ in header.crcs]
+        self.done = 0
+        self.held = device is not None
+        self.last: Exception | None = None
+
+    def spans(self, size: int) -> list[Gap]:
+        points = self._header.points
+        return [
+            Gap(channel, start, min(size, points - start))
+            for channel in range(1, len(self._header.crcs) + 1)
+            for start in range(0, points, size)
+        ]
+
+    def take(self, span: Gap, tries: int) -> bool:
+        """Whether the span was had, from what is noted or from the recorder while it holds the record."""
+        samples = self._chunks.get(span.channel, span.start, span.count)
+        if samples is None and self._device is not None and self.held and tries:
+            samples = self._fetch(self._device, span, tries)
+            self.held = samples is not None or self._still_held(self._device)
+        if samples is None:
+            return False
+        self.channels[span.channel - 1][span.start : span.start + span.count] = samples
+        self.done += span.count
+        self._progress(self.done, self._header.points * len(self._header.crcs))
+        return True
+
+    def _fetch(self, device: Device, span: Gap, tries: int) -> Counts | None:
+        for attempt in range(tries):
+            try:
+                if attempt:
+                    device.resynchronise()
+                samples = device.read(span.channel, span.start, span.count)
+                if len(samples) != span.count:
+                    raise BadReply(f"{len(samples)} samples came for {span.count}")
+                if crc32(samples) != device.crc(span.channel, span.start, span.count):
+                    raise BadReply("the CRC-32 does not match")
+                self._chunks.add(span.channel, span.start, samples)
+                return samples
+            except (LinkError, DeviceError) as e:
+                self.last = e
+        return None
+
+    def _still_held(self, device: Device) -> bool:
+        """Whether the record is still there. LinkError: the wire is gone, and with it the answer."""
         try:
-            if attempt:
-                device.resynchronise()
-            samples = device.read(channel, start, count)
-            if len(samples) != count:
-                raise BadReply(f"{len(samples)} samples came for {count}")
-            if crc32(samples) != device.crc(channel, start, count):
-                raise BadReply("the CRC-32 does not match")
-            return samples
-        except (LinkError, DeviceError) as e:
-            last = e
-    raise LinkError(
-        f"samples {start} to {start + count - 1} of channel {channel} could not be read in {TRIES} tries: {last}; "
-        f"the recorder still holds the record: mend the line, then `droptower recover`"
-    )
+            return again(device, device.header) == self._header
+        except LinkError:
+            raise LinkError(
+                f"the wire failed in the middle of the record: {self.last}; the recorder still holds it: "
+                f"mend the line, then `droptower recover` goes on from sample {self.done}"
+            ) from None
+
+
+def _pieces(gap: Gap) -> list[Gap]:
+    end = gap.start + gap.count
+    return [Gap(gap.channel, start, min(PIECE, end - start)) for start in range(gap.start, end, PIECE)]
+
+
+def _joined(gaps: list[Gap]) -> tuple[Gap, ...]:
+    """Neighbours as one."""
+    out: list[Gap] = []
+    for gap in sorted(gaps, key=lambda g: (g.channel, g.start)):
+        if out and out[-1].channel == gap.channel and out[-1].start + out[-1].count == gap.start:
+            out[-1] = Gap(gap.channel, out[-1].start, out[-1].count + gap.count)
+        else:
+            out.append(gap)
+    return tuple(out)
 
 
 def again(device: Device, call: Callable[[], T]) -> T:

@@ -2,11 +2,13 @@
 
 from typing import Any
 
-from daq.acquisition import Emit, finish, release, settle
-from daq.errors import AcquisitionError, StoreError
+from daq.acquisition import settle
+from daq.chunks import Chunks
+from daq.errors import AcquisitionError, LinkError, StoreError
+from daq.finish import Emit, as_run, finish, release, save
 from daq.journal import Journal
-from daq.readout import again
-from daq.recorder import Header
+from daq.readout import again, read_noted
+from daq.recorder import GateReading, Header
 from daq.rig import Rig
 from daq.run import new_run_id, now
 from daq.run_file import read_provenance
@@ -14,57 +16,108 @@ from daq.store import Store
 from daq.test_file import TestFile
 from daq.toml_file import validate
 
+Test = tuple[TestFile, str]
 
-def recover(rig: Rig, rig_text: str, test: tuple[TestFile, str] | None, store: Store, emit: Emit) -> str | None:
-    """The run that was saved or found saved, None if the recorder holds nothing. `test`: for a record of no known test.
+
+def recover(rig: Rig, rig_text: str, given: Test | None, store: Store, emit: Emit, give_up: bool = False) -> str | None:
+    """The run that was saved or found saved, None if there is nothing to recover.
+
+    given : test file of a record that nobody here armed
+    give_up : release a record of which a partial run is all that can be had
 
     Raises
     ------
     AcquisitionError : the held record was armed by nobody this data folder knows, and no test file was given.
     """
     device = rig.recorder
+    journal = Journal(store.folder, rig.identity)
+    note = journal.read() or {}
     status = settle(device, emit)
-    journal = Journal(store.folder, rig.file.recorder.port)
-    if not status.held:
+    header = again(device, device.header) if status.held else None
+    lost = _salvage(rig, rig_text, note, header, journal, store, emit)
+    if header is None:
+        if lost is None:
+            emit("nothing-held", recorder=rig.identity)
         journal.remove()
-        emit("nothing-held", recorder=rig.identity)
-        return None
-    header = again(device, device.header)
-    if (run := _already_saved(store, rig.identity, header)) is not None:
-        emit("found-saved", run=run, record_id=header.record_id)
+        return lost
+    found = _already_saved(store, rig.identity, header)
+    if found is not None and (found[1] == 0 or give_up):
+        emit("found-saved", run=found[0], record_id=header.record_id, missing=found[1])
         release(device, header, emit)
         journal.remove()
-        return run
-    note = journal.read()
-    if note is not None and not _belongs(note, rig.identity, header):
-        note = None
-    if test is not None:
-        chosen, text = test
-    elif note is not None:
-        chosen, text = validate(note["test"], TestFile, str(journal.path)), note["test_text"]
-    else:
+        return found[0]
+    ours = _belongs(note, header)
+    test = given or (_noted_test(note, journal) if ours else None)
+    if test is None:
         raise AcquisitionError(
             "held",
             f"the recorder holds record {header.record_id}, and {journal.path.parent} has no note of its test; "
             f"give the test file with --test",
         )
-    known: dict[str, Any] = note or {}
-    run = known.get("run") or new_run_id()
+    run = note["run"] if ours and note["run"] not in store.runs() else new_run_id()
+    series = note.get("series") if ours else None
     emit("held", run=run, record_id=header.record_id)
-    return finish(rig, header, chosen, (rig_text, text), run, known.get("series"), now(), store, journal, emit)
+    fewest = found[1] if found is not None else None
+    done = finish(rig, header, test[0], (rig_text, test[1]), run, series, now(), store, journal, emit, fewest)
+    return done if done in store.runs() or found is None else found[0]
 
 
-def _belongs(note: dict[str, Any], identity: str, header: Header) -> bool:
-    return (note["identity"], note["boot"], note["record_id"]) == (identity, header.boot, header.record_id)
+def _salvage(
+    rig: Rig, rig_text: str, note: dict[str, Any], held: Header | None, journal: Journal, store: Store, emit: Emit
+) -> str | None:
+    """A partial run of what was read of a record that the recorder has lost since; None if there is no such record."""
+    record = Chunks.record_in(journal.chunks_path)
+    if record is None:
+        return None
+    header = Header.from_json(record)
+    if header == held or not _belongs(note, header):
+        return None
+    found = _already_saved(store, rig.identity, header)
+    if found is not None:
+        return found[0]
+    chunks = journal.chunks(header)
+    try:
+        readout = read_noted(header, chunks)
+    except LinkError:
+        return None
+    finally:
+        chunks.close()
+    test, text = _noted_test(note, journal)
+    gate = GateReading(header.record_id, ())
+    texts, run, series = (rig_text, text), note["run"], note.get("series")
+    data = as_run(rig.file, rig.identity, header, readout, gate, test, texts, run, series, now())
+    save(data, store, emit)
+    emit(
+        "partial",
+        run=data.run,
+        missing=data.missing,
+        gaps=readout.gap_map,
+        text=f"the recorder has lost the record; {data.missing} samples are missing of what was read before",
+    )
+    return data.run
 
 
-def _already_saved(store: Store, identity: str, header: Header) -> str | None:
+def _noted_test(note: dict[str, Any], journal: Journal) -> Test:
+    return validate(note["test"], TestFile, str(journal.path)), note["test_text"]
+
+
+def _belongs(note: dict[str, Any], header: Header) -> bool:
+    return (note.get("boot"), note.get("record_id")) == (header.boot, header.record_id)
+
+
+def _already_saved(store: Store, identity: str, header: Header) -> tuple[str, int] | None:
+    """The run of this record that misses least, and how many samples it misses."""
     wanted = header.as_json()
+    best: tuple[str, int] | None = None
     for run in reversed(store.runs()):
         try:
             facts = read_provenance(store.raw(run))
         except StoreError:
             continue  # a damaged run is no proof that the record is safe
         if facts.get("recorder") == identity and facts.get("header") == wanted:
-            return run
-    return None
+            missing = int(facts.get("missing", 0))
+            if best is None or missing < best[1]:
+                best = run, missing
+            if missing == 0:
+                break
+    return best

@@ -20,16 +20,23 @@ RUN_ID = r"\d{8}T\d{6}Z-[0-9a-f]{6}"
 
 @dataclass(frozen=True)
 class ChannelData:
-    """Samples of one channel: int16 counts of a recorder (`bits` of them used), or float64 as a file gave them."""
+    """Samples of one channel: int16 counts of a recorder (`bits` of them used), or float64 as a file gave them.
+
+    gaps : (start, count) of samples that could not be had; they stand as 0 counts
+    """
 
     calibration: Channel
     samples: NDArray[Any]
     bits: int | None = None
+    gaps: tuple[tuple[int, int], ...] = ()
 
     def calibrated(self, part: slice = slice(None)) -> NDArray[np.float64]:
-        """Samples in the channel's unit."""
+        """Samples in the channel's unit; NaN in the gaps."""
         scale = self.calibration
-        return np.asarray(self.samples[part], dtype=np.float64) * scale.counts_to_unit + scale.offset
+        values = np.asarray(self.samples, dtype=np.float64) * scale.counts_to_unit + scale.offset
+        for start, count in self.gaps:
+            values[start : start + count] = np.nan
+        return values[part]
 
 
 @dataclass(frozen=True)
@@ -55,6 +62,11 @@ class RunData:
     @property
     def points(self) -> int:
         return len(self.channels[0].samples)
+
+    @property
+    def missing(self) -> int:
+        """Samples that could not be had, over all channels."""
+        return sum(count for channel in self.channels for _, count in channel.gaps)
 
     @property
     def pretrigger(self) -> int | None:

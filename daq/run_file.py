@@ -141,6 +141,10 @@ def _write_channel(g: h5py.Group, channel: ChannelData, run: RunData) -> None:
         g.attrs[f"calibration_u_{key}"] = value
     if channel.bits is not None:
         g.attrs["adc_bits"] = channel.bits
+    if channel.gaps:
+        gaps = g.create_dataset("gaps", data=np.asarray(channel.gaps, dtype=np.int64))
+        gaps.attrs["units"] = "samples"
+        gaps.attrs["long_name"] = "first and number of the samples that could not be had; they stand as 0"
     _scalar(g, "sample_interval", run.dt, "s")
     if run.first_sample_ns is not None:
         _scalar(g, "first_sample", run.first_sample_ns, "ns")
@@ -154,7 +158,8 @@ def _read_channel(g: Any) -> ChannelData:
     if zlib.crc32(samples.data) != g["data"].attrs["crc32"]:
         raise StoreError(f"{g.file.filename}: samples of {calibration.name} do not match their CRC-32")
     bits = g.attrs.get("adc_bits")
-    return ChannelData(calibration, samples, None if bits is None else int(bits))
+    gaps = tuple((int(start), int(count)) for start, count in g["gaps"][()]) if "gaps" in g else ()
+    return ChannelData(calibration, samples, None if bits is None else int(bits), gaps)
 
 
 def _write_sample(g: h5py.Group, run: RunData) -> None:
@@ -190,7 +195,7 @@ def envelope(values: NDArray[np.float64], points: int) -> NDArray[np.int64]:
         return np.arange(n, dtype=np.int64)
     stretches = points // 2
     width = -(-n // stretches)
-    padded = np.pad(values, (0, -n % width), mode="edge").reshape(-1, width)
+    padded = np.pad(np.nan_to_num(values, nan=0.0), (0, -n % width), mode="edge").reshape(-1, width)
     start = np.arange(len(padded), dtype=np.int64) * width
     ends = np.stack([start + padded.argmin(axis=1), start + padded.argmax(axis=1)])
     return np.unique(np.minimum(np.sort(ends, axis=0).T.ravel(), n - 1))

@@ -26,12 +26,15 @@ def recover(
     test: Annotated[
         Path | None, typer.Option("--test", help="For a record that nobody here armed.", metavar="TEST.toml")
     ] = None,
+    give_up: Annotated[
+        bool, typer.Option("--give-up", help="Release a record of which a partial run is all that can be had.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Save the record that a recorder still holds, or release it if it is saved."""
     from api.process import Acquisition
 
-    _take(Acquisition("recover", rig, data, test), data, as_json)
+    _take(Acquisition("recover", rig, data, test, give_up=give_up), data, as_json)
 
 
 def sim(

@@ -1,0 +1,91 @@
+"""What has been read of a held record, chunk by chunk on disk: a readout that was cut off goes on where it stopped.
+
+Not synced: the recorder still holds the record, and what a power cut takes from here is read again.
+"""
+
+import contextlib
+import json
+import struct
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from daq.recorder import Counts, crc32
+
+_HEAD = struct.Struct("<IIII")
+
+
+class Chunks:
+    """Chunks of one record, in memory and in `path`. Those of another record found there are thrown away.
+
+    A disk that does not take them costs only the resuming, so that is not an error here.
+    """
+
+    def __init__(self, path: Path, record: dict[str, Any]) -> None:
+        self.path = path
+        self._found: dict[tuple[int, int], Counts] = {}
+        title = json.dumps(record, sort_keys=True).encode() + b"\n"
+        self._file: BinaryIO | None = None
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            kept = self._load(path.read_bytes(), title) if path.exists() else 0
+            self._file = path.open("r+b" if kept else "w+b", buffering=0)
+            self._file.truncate(kept)
+            self._file.seek(kept)
+            if not kept:
+                self._file.write(title)
+        except OSError:
+            self._file = None
+
+    def _load(self, content: bytes, title: bytes) -> int:
+        """Bytes of `content` that are whole chunks of this record."""
+        if not content.startswith(title):
+            return 0
+        at = len(title)
+        while at + _HEAD.size <= len(content):
+            channel, start, count, crc = _HEAD.unpack_from(content, at)
+            end = at + _HEAD.size + 2 * count
+            samples = np.frombuffer(content[at + _HEAD.size : end], dtype="<i2").astype(np.int16)
+            if len(samples) != count or crc32(samples) != crc:
+                break
+            self._found[channel, start] = samples
+            at = end
+        return at
+
+    @staticmethod
+    def record_in(path: Path) -> dict[str, Any] | None:
+        """The record that the chunks at `path` belong to; None if there are none, or not even a title."""
+        try:
+            with path.open("rb") as f:
+                return json.loads(f.readline())
+        except (OSError, ValueError):
+            return None
+
+    def get(self, channel: int, start: int, count: int) -> Counts | None:
+        """The samples of a chunk, if it was read."""
+        samples = self._found.get((channel, start))
+        return samples if samples is not None and len(samples) == count else None
+
+    def add(self, channel: int, start: int, samples: Counts) -> None:
+        """Keep a chunk."""
+        self._found[channel, start] = samples
+        head = _HEAD.pack(channel, start, len(samples), crc32(samples))
+        if self._file is None:
+            return
+        try:
+            self._file.write(head + samples.astype("<i2").tobytes())
+        except OSError:
+            self.close()
+
+    def close(self) -> None:
+        """Stop noting; what is noted stays for whoever goes on."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None
+
+    def remove(self) -> None:
+        """Nothing more will be asked of them."""
+        self.close()
+        with contextlib.suppress(OSError):
+            self.path.unlink()
