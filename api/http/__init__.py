@@ -1,0 +1,1 @@
+"""The HTTP service: runs, samples and findings by REST under /api/v1, the bench page for people."""

@@ -1,0 +1,138 @@
+"""The bench: one acquisition at a time, started by command, followed, disarmed on request, outliving the service."""
+
+import shutil
+import tempfile
+import threading
+from pathlib import Path
+from typing import Any
+
+from api.http.links import ACQUISITION, of_run
+from api.process import Acquisition
+from daq.errors import RigBusy
+from daq.lock import RigLock
+from daq.rig_file import load_rig
+from daq.test_file import TestFile
+from daq.toml_file import parse
+
+STATES = {
+    "connected": "connected",
+    "configured": "configured",
+    "waiting-for-interlock": "waiting",
+    "armed": "armed",
+    "triggered": "triggered",
+    "held": "reading",
+    "reading": "reading",
+    "progress": "reading",
+    "saved": "saved",
+    "released": "saved",
+    "not-released": "saved",
+    "found-saved": "saved",
+    "done": "saved",
+    "failed": "failed",
+}
+"""The state that an event of the acquisition leaves it in; other events leave it as it is."""
+NOTHING: dict[str, Any] = {
+    "state": "idle", "done": True, "run": None, "text": None, "progress": None, "events": [],
+}  # fmt: skip
+STARTING = "starting"
+UNNAMED = "unnamed.toml"
+"""A test file's stem is the specimen's id, if the file gives none."""
+
+
+class Bench:
+    """One rig, and the drop that was last asked of it."""
+
+    def __init__(self, rig: Path, data: Path) -> None:
+        self.rig = rig
+        self._file = load_rig(rig)[0]
+        self._data = data
+        self._lock = threading.Lock()
+        self._current: Acquisition | None = None
+
+    @property
+    def current(self) -> Acquisition | None:
+        """The acquisition that runs, or the last that ran."""
+        return self._current
+
+    def start(self, test_text: str, series: str | None) -> None:
+        """Configure and arm, for a test of this text.
+
+        Raises
+        ------
+        SettingsError : the text is no test file.
+        RigBusy : an acquisition is running, of this service or another.
+        """
+        parse(test_text, TestFile, "the test file")
+        with self._lock:
+            self._refuse_second()
+            folder = Path(tempfile.mkdtemp(prefix="droptower-test-"))
+            test = folder / UNNAMED
+            test.write_text(test_text, encoding="utf-8")
+            self._current = Acquisition("acquire", self.rig, self._data, test, series)
+        threading.Thread(target=_sweep, args=(self._current, folder), daemon=True).start()
+
+    def recover(self) -> None:
+        """Save what the recorder still holds of a drop that was cut short.
+
+        Raises
+        ------
+        RigBusy : an acquisition is running, of this service or another.
+        """
+        with self._lock:
+            self._refuse_second()
+            self._current = Acquisition("recover", self.rig, self._data)
+
+    def _refuse_second(self) -> None:
+        if self._current is not None and not self._current.done:
+            raise RigBusy(f"a drop is {told(self._current.events)['state']} on this rig; disarm it or wait for its end")
+        if (holder := self._held_elsewhere()) is not None:
+            raise RigBusy(holder)
+
+    def disarm(self) -> None:
+        """Ask the acquisition to disarm; a record whose trigger has come is read and saved all the same."""
+        if self._current is not None:
+            self._current.abort()
+
+    def state(self) -> dict[str, Any]:
+        """Where the acquisition is, in a word and in the words of its last event, with the events so far."""
+        current = self._current
+        if current is not None and not current.done:
+            return {**told(list(current.events)), "done": False}
+        if (holder := self._held_elsewhere()) is not None:
+            return {**NOTHING, "state": "busy", "text": holder}
+        return NOTHING if current is None else {**told(list(current.events)), "done": True}
+
+    def _held_elsewhere(self) -> str | None:
+        """Who else holds the rig: a command, or the drop of a service that has died."""
+        try:
+            with RigLock(self._file, "the service looks who holds it"):
+                return None
+        except RigBusy as busy:
+            return str(busy)
+
+
+def after(state: str, event: dict[str, Any]) -> str:
+    """The state that an event leads to."""
+    if event["event"] == "failed" and event.get("outcome") == "aborted":
+        return "disarmed"
+    if event["event"] == "done" and event["run"] is None:
+        return "idle"
+    return STATES.get(event["event"], state)
+
+
+def told(events: list[dict[str, Any]]) -> dict[str, Any]:
+    """What a row of events amounts to."""
+    state, run, text, progress = STARTING, None, None, None
+    for event in events:
+        state = after(state, event)
+        run = event.get("run") or run
+        text = event.get("text")
+        if event["event"] == "progress":
+            progress = {"done": event["done"], "total": event["total"]}
+    links = {**ACQUISITION, "run": of_run(run)["self"] if run is not None and state == "saved" else None}
+    return {"state": state, "run": run, "text": text, "progress": progress, "events": events, "links": links}
+
+
+def _sweep(acquisition: Acquisition, folder: Path) -> None:
+    acquisition.result()
+    shutil.rmtree(folder, ignore_errors=True)

@@ -1,0 +1,119 @@
+"""Routes of runs: the list, one run's answer, its files."""
+
+import base64
+import tempfile
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Depends, Query, Request
+from fastapi.responses import FileResponse, JSONResponse, Response
+from starlette.background import BackgroundTask
+
+from api.answer import answer_of
+from api.http import links
+from api.http.caching import tag, tag_of_folder, tagged, unchanged
+from api.http.queries import cursor, moment, only_known
+from api.http.rendering import plain
+from api.http.shared import Shared
+from daq.catalog import FILTERS, as_json
+from daq.export import export_csv, export_nexus
+from daq.test_file import TestFile
+
+MOST_RUNS = 1000
+router = APIRouter(tags=["runs"], dependencies=[Depends(only_known)])
+Filter = Annotated[str | None, Query(max_length=200)]
+
+
+@router.get("/runs")
+def list_runs(
+    shared: Shared,
+    series: Filter = None,
+    specimen: Filter = None,
+    material: Filter = None,
+    batch: Filter = None,
+    source: Annotated[Literal["acquired", "imported"] | None, Query()] = None,
+    since: Annotated[
+        str | None, Query(description="Started at this time (UTC unless it says otherwise) or later")
+    ] = None,
+    after: Annotated[str | None, Query(description="The run after which the list goes on, as in links.next")] = None,
+    limit: Annotated[int, Query(ge=1, le=MOST_RUNS)] = 100,
+) -> Response:
+    """Runs, newest first."""
+    given = dict(zip(FILTERS, (series, specimen, material, batch, source), strict=True))
+    where = {k: v for k, v in given.items() if v is not None}
+    rows = shared.catalog.runs(where, moment(since), cursor(after), limit + 1)
+    found = [{**as_json(r), "links": _few_links(r.run)} for r in rows[:limit]]
+    asked = {**where, "since": since, "limit": limit}
+    more = links.runs(**asked, after=found[-1]["run"]) if len(rows) > limit else None
+    body = {"runs": found, "links": {"self": links.runs(**asked, after=after), "next": more}}
+    return JSONResponse(plain(body))
+
+
+def _few_links(run: str) -> dict[str, str]:
+    every = links.of_run(run)
+    return {k: every[k] for k in ("self", "force", "page")}
+
+
+@router.get("/runs/{run}")
+def get_run(request: Request, shared: Shared, run: str) -> Response:
+    """Findings with uncertainties, warnings and conditions; a run that was never analysed is analysed now."""
+    trace = shared.traces.get(run)
+    if (same := unchanged(request, tag_of_folder(shared.store, trace))) is not None:
+        return same
+    answer = answer_of(shared.store, run)
+    data = trace.run
+    facts = {
+        "started": data.started,
+        "source": data.source,
+        "specimen": data.test.specimen.id,
+        "material": data.test.specimen.material,
+        "points": data.points,
+        "sample_rate_Hz": 1 / data.dt,
+        "conditions": tree_of(data.test),
+        "links": links.of_run(run),
+    }
+    return tagged(JSONResponse(plain({**answer, **facts})), tag_of_folder(shared.store, trace))
+
+
+def tree_of(test: TestFile) -> dict[str, Any]:
+    """A test as its file would say it: tables of keys, each uncertainty beside its number."""
+    tree = test.model_dump(mode="json", by_alias=True, exclude_none=True)
+    return {name: kept for name, table in tree.items() if (kept := _flat(table))}
+
+
+def _flat(table: dict[str, Any]) -> dict[str, Any]:
+    u = {f"u_{k}": v for k, v in table.get("u", {}).items()}
+    rest = {k: [_flat(row) for row in v] if k == "channel" else v for k, v in table.items() if k != "u"}
+    return {k: v for k, v in (rest | u).items() if v != []}
+
+
+@router.get("/runs/{run}/raw", response_class=FileResponse)
+def get_raw(request: Request, shared: Shared, run: str) -> Response:
+    """The file as it was recorded, with its SHA-256 in `Repr-Digest`."""
+    path = shared.store.raw(run)
+    digest = shared.store.sha256(run)
+    etag = tag(digest)
+    if (same := unchanged(request, etag)) is not None:
+        return same
+    stated = base64.b64encode(bytes.fromhex(digest)).decode()
+    headers = {"Repr-Digest": f"sha-256=:{stated}:", "Droptower-Sha256": digest}
+    return tagged(FileResponse(path, media_type="application/x-hdf5", filename=f"{run}.h5", headers=headers), etag)
+
+
+@router.get("/runs/{run}/export", response_class=FileResponse)
+def get_export(shared: Shared, run: str, format: Annotated[Literal["csv", "h5"], Query()] = "h5") -> Response:
+    """Every sample as CSV, or one self-contained NeXus file with the findings in it."""
+    data = shared.traces.get(run).run
+    folder = tempfile.TemporaryDirectory(prefix="droptower-export-", ignore_cleanup_errors=True)
+    try:
+        path = Path(folder.name) / f"{run}.{format}"
+        if format == "csv":
+            export_csv(data, path)
+        else:
+            export_nexus(data, answer_of(shared.store, run), path)
+    except BaseException:
+        folder.cleanup()
+        raise
+    kind = {"csv": "text/csv; charset=utf-8", "h5": "application/x-hdf5"}[format]
+    name = f"{run}.csv" if format == "csv" else f"{run}.nexus.h5"
+    return FileResponse(path, media_type=kind, filename=name, background=BackgroundTask(folder.cleanup))

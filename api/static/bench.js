@@ -1,0 +1,120 @@
+// The bench: arm, follow, disarm. What the banner says comes from the acquisition's own events, never from a guess.
+
+import { ask, askJson } from "./service.js";
+import { refresh } from "./list.js";
+
+const PATH = "/api/v1/acquisitions";
+const LOOK_MS = 2000;
+const SAYS = {
+  idle: ["○", "NOT ARMED", "Fill in the test, then arm."],
+  starting: ["◌", "CONNECTING", "Reaching the recorder."],
+  connected: ["◌", "CONNECTED", "Giving the recorder its settings."],
+  configured: ["◔", "CONFIGURED", "Not armed yet: keep the dart in its clamp."],
+  waiting: ["◔", "NOT READY", "The interlock does not allow a drop yet."],
+  armed: ["▼", "ARMED – DROP NOW", "The recorder waits for the impact."],
+  triggered: ["◆", "TRIGGERED", "Recording."],
+  reading: ["◕", "READING", "The recorder holds the record until it is saved."],
+  saved: ["✓", "SAVED", ""],
+  disarmed: ["○", "DISARMED", "No drop was recorded."],
+  failed: ["✕", "FAILED", ""],
+  busy: ["▣", "IN USE", "Another process holds the rig."],
+  lost: ["?", "NO ANSWER", "The service does not answer. A drop that is armed goes on without it; this page tries again."],
+};
+const RUNNING = ["starting", "connected", "configured", "waiting", "armed", "triggered", "reading"];
+const DISARMABLE = ["starting", "connected", "configured", "waiting", "armed"];
+const $ = (id) => document.getElementById(id);
+let stream = null;
+
+function show(state, text = null, progress = null) {
+  const [mark, word, usual] = SAYS[state];
+  const share = progress && progress.total ? progress.done / progress.total : 0;
+  $("banner").dataset.state = state;
+  $("state-mark").textContent = mark;
+  $("state-word").textContent = state === "reading" ? `${word} ${Math.floor(100 * share)} %` : word;
+  $("state-text").textContent = text || usual;
+  $("progress").hidden = state !== "reading";
+  $("progress").value = share;
+  $("arm").disabled = RUNNING.includes(state) || state === "lost" || state === "busy";
+  $("recover").hidden = state !== "failed";
+  $("disarm").disabled = !DISARMABLE.includes(state);
+  document.title = `${word} · droptower`;
+}
+
+// What stands under the state's word; null for the words that belong to the state.
+function words(state, { run, text }) {
+  if (state === "saved") return run ? `${run}: on the disk, and it reads back the same.` : $("state-text").textContent;
+  return state === "armed" ? null : text;
+}
+
+function complain(words) {
+  $("order-error").textContent = words;
+  $("order-error").hidden = words === "";
+}
+
+function follow() {
+  stream?.close();
+  stream = new EventSource(`${PATH}/current/events`);
+  stream.onmessage = async ({ data }) => {
+    const event = JSON.parse(data);
+    show(event.state, words(event.state, event), event.event === "progress" ? event : null);
+    if (event.event === "saved") await refresh();
+    if (event.event === "done" || event.event === "failed") {
+      stream?.close();
+      stream = null;
+    }
+  };
+  stream.onopen = () => tell().catch(() => show("lost"));
+  stream.onerror = () => show("lost");
+}
+
+async function tell() {
+  const now = await askJson(`${PATH}/current`);
+  show(now.state, words(now.state, now), now.progress);
+  return now;
+}
+
+async function catchUp() {
+  if (!(await tell()).done) follow();
+}
+
+async function look() {
+  try {
+    if (stream === null || stream.readyState === EventSource.CLOSED) await catchUp();
+  } catch {
+    show("lost");
+  }
+  setTimeout(look, LOOK_MS);
+}
+
+async function start(path, order) {
+  complain("");
+  $("arm").disabled = true;
+  try {
+    await ask(path, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(order) });
+    show("starting");
+    follow();
+  } catch (error) {
+    complain(error.message);
+    await catchUp().catch(() => show("lost"));
+  }
+}
+
+$("order").addEventListener("submit", (event) => {
+  event.preventDefault();
+  start(PATH, { test: $("test").value, series: $("series").value.trim() || null });
+});
+$("recover").addEventListener("click", () => start(`${PATH}/recovery`, {}));
+
+$("disarm").addEventListener("click", async () => {
+  $("disarm").disabled = true;
+  await ask(`${PATH}/current`, { method: "DELETE" }).catch((error) => complain(error.message));
+});
+
+// What was typed outlives a reload of the page, but not a newer drop, whose test is the better start.
+const draft = `droptower-draft-${$("test").dataset.from}`;
+for (const id of ["test", "series"]) {
+  const kept = sessionStorage.getItem(`${draft}-${id}`);
+  if (kept !== null) $(id).value = kept;
+  $(id).addEventListener("input", () => sessionStorage.setItem(`${draft}-${id}`, $(id).value));
+}
+await look();
