@@ -19,7 +19,7 @@ with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as service, sy
     page = browser.new_page(viewport={"width": 1400, "height": 1290})
     page.goto(url)
     page.goto(url.rstrip("/") + str(page.locator("table a").first.get_attribute("href")))
-    page.wait_for_function("document.querySelectorAll('.js-plotly-plot').length >= 3")
+    page.locator(".js-plotly-plot").nth(2).wait_for()  # no wait_for_function: the page's policy forbids eval
     page.wait_for_load_state("networkidle")
     page.screenshot(path=Path(__file__).with_name("run.png"))
     browser.close()
