@@ -23,6 +23,7 @@ class Events:
     force : (n,) N, contact force (zero level, droop and tip mass corrected), from sample `first` of the record on
     t : (n,) s on the record's axis; noise : N, of that force; u_level : N, of its zero level
     start, end : the two ends of contact (None: not in the record); second : onset of the second contact
+    bounces : contacts after the first; None where its end is not in the record
     peak : index of the largest sample in `force`
     """
 
@@ -37,6 +38,7 @@ class Events:
     second: Edge | None
     peak: int
     ringing: Ringing | None
+    bounces: int | None = None
 
 
 def quantisation(record: Record) -> float:
@@ -64,22 +66,22 @@ def locate(record: Record, impact: Impact) -> Events | None:
     start = None if contact.start is None else edge(events, impact, begin - first, peak, length, ending=False)
     end = None if contact.end is None else edge(events, impact, stop - first, peak, length, ending=True)
     events = replace(events, start=start, end=end)
-    return replace(events, second=_second(record, impact, events))
+    return _with_bounces(record, impact, events)
 
 
-def _second(record: Record, impact: Impact, events: Events) -> Edge | None:
-    """Onset of the second contact, s on the record's axis."""
+def _with_bounces(record: Record, impact: Impact, events: Events) -> Events:
+    """The events with the onset of the second contact, s on the record's axis, and the number of bounces."""
     floor = quantisation(record)
     contact = events.contact
     begin, stop = contact.start, contact.end
     if begin is None or stop is None:
-        return None
+        return events
     tip = impact.mass / (impact.mass - impact.tip_mass)
     impulse = float(np.sum(events.force[begin - events.first : stop - events.first])) * record.dt / tip
     found = find_second(record.force, record.dt, contact, impulse, floor, record.time_constant)
     if found is None:
-        return None
-    offset, piece, second = found
+        return replace(events, bounces=0)
+    offset, piece, second, bounces = found
     assert second.start is not None
     end = second.end if second.end is not None else piece.size
     again = Events(
@@ -95,7 +97,8 @@ def _second(record: Record, impact: Impact, events: Events) -> Edge | None:
         peak=second.peak,
         ringing=None,
     )
-    return edge(again, impact, second.start, second.peak, (end - second.start) * record.dt, ending=False)
+    onset = edge(again, impact, second.start, second.peak, (end - second.start) * record.dt, ending=False)
+    return replace(events, second=onset, bounces=bounces)
 
 
 def corrected(record: Record, level: Level, first: int, last: int, begin: int) -> Array:

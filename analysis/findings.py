@@ -25,6 +25,7 @@ UNITS: dict[str, str] = {
     "alpha_r": "m",
     "t_contact": "s",
     # beyond the contract
+    "bounces": "1",
     "t_second": "s",
     "t_nc": "s",
     "t_fall": "s",

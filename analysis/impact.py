@@ -77,6 +77,7 @@ def _events(record: Record, impact: Impact, events: Events, answer: Answer) -> N
         answer.set("t_M", peak.t - events.start.t, math.hypot(peak.u_t, events.start.u))
         if events.end is not None:
             answer.set("t_c", events.end.t - events.start.t, apart(events.start.u, events.end.u))
+    answer.set("bounces", events.bounces)
     if events.second is not None:
         answer.set("t_second", events.second.t, events.second.u)
         if events.end is not None:

@@ -15,8 +15,9 @@ _LEAST_IMPULSE = 0.03  # of the first contact's
 
 def find_second(
     force: Array, dt: float, first: Contact, impulse: float, floor: float, time_constant: float | None
-) -> tuple[int, Array, Contact] | None:
-    """Second contact in `force` (n,) N after `first` of `impulse` N·s: offset, samples from there on, contact in them.
+) -> tuple[int, Array, Contact, int] | None:
+    """Second contact in `force` (n,) N after `first` of `impulse` N·s: offset, samples from there on, contact in them,
+    and how many contacts follow the first in all.
 
     Means over an eighth of the first contact cancel ringing and rebound vibration; half a contact's length of them must
     carry 3 % of the first impulse.
@@ -41,7 +42,8 @@ def find_second(
     high = min(force.size, begin + int(hits[0]) * block + 4 * length)
     piece = force[low:high]
     found = find_contact(piece, dt, floor)
-    return None if found is None or found.start is None else (low, piece, found)
+    bounces = 1 + int(np.count_nonzero(np.diff(hits) > _BLOCKS_PER_CONTACT))
+    return None if found is None or found.start is None else (low, piece, found, bounces)
 
 
 def _spread(means: Array, level: Level) -> float:

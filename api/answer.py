@@ -6,6 +6,7 @@ from typing import Any
 from analysis import Kinematics, analyze, kinematics
 from analysis.findings import UNITS
 from api.join import impact_of, record_of
+from daq.errors import StoreError
 from daq.run import RunData
 from daq.store import Store
 
@@ -18,14 +19,18 @@ def answer_of(store: Store, run: str) -> dict[str, Any]:
     Raises
     ------
     RunNotFound : no such run.
-    StoreError : its file is damaged, or the answer cannot be written beside it.
+    StoreError : its file is damaged.
     """
     made_by = {"droptower": version("droptower"), "raw_sha256": store.sha256(run)}
     kept = store.analysis(run)
     if kept is not None and {k: kept.get(k) for k in made_by} == made_by:
         return kept
     answer = {**_analysed(store.read(run)), **made_by}
-    store.add_analysis(run, answer)
+    try:
+        store.add_analysis(run, answer)
+    except StoreError as e:
+        text = f"{e}; the answer is not kept beside its run"
+        return {**answer, "warnings": [*answer["warnings"], {"code": "answer-not-kept", "text": text}]}
     return answer
 
 

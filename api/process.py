@@ -36,7 +36,7 @@ class Acquisition:
     ) -> None:
         command = [sys.executable, "-m", "daq", do, "--rig", str(rig), "--data", str(data)]
         command += ["--test", str(test)] if test is not None else []
-        command += ["--series", series] if series is not None else []
+        command += [f"--series={series}"] if series is not None else []
         command += ["--give-up"] if give_up else []
         self.events: list[Event] = []
         self._news = threading.Condition()

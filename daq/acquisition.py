@@ -42,7 +42,7 @@ def acquire(
     store.check_writable(2 * wanted.points * len(file.recorder.channel) + 1_000_000)
     _configure(device, wanted)
     emit("configured", sample_rate_Hz=1e9 / wanted.interval_ns, samples=wanted.points, pretrigger=wanted.pretrigger)
-    _await_interlock(rig, emit)
+    _await_interlock(rig, stop, emit)
     run = new_run_id()
     journal = Journal(store.folder, rig.identity)
     note = {"run": run, "series": series, "rig_text": texts[0], "test_text": texts[1]}
@@ -94,7 +94,7 @@ def _configure(device: Device, wanted: Settings) -> None:
         raise DeviceError(f"the recorder does not take its settings: {told}; change them in the rig file")
 
 
-def _await_interlock(rig: Rig, emit: Emit) -> None:
+def _await_interlock(rig: Rig, stop: Callable[[], bool], emit: Emit) -> None:
     if rig.interlock is None or rig.file.interlock is None:
         return
     end = time.monotonic() + rig.file.interlock.wait_s
@@ -105,6 +105,8 @@ def _await_interlock(rig: Rig, emit: Emit) -> None:
             raise AcquisitionError(
                 "interlock", f"the interlock does not allow a drop: {why}; mend that, then arm again"
             )
+        if stop():
+            raise AcquisitionError("aborted", f"stopped as asked, before arming: {why}")
         if not told:
             told = True
             emit("waiting-for-interlock", text=why)

@@ -9,8 +9,8 @@ from collections.abc import Awaitable, Callable
 from dataclasses import asdict, replace
 from typing import Any
 
+from sim_device.acquisition import State
 from sim_device.device import Device, log
-from sim_device.recorder import State
 from sim_device.scpi_commands import SCPI
 from sim_device.settings import SettingError, changed, nearest
 from sim_device.tower import Refused

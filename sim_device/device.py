@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import sys
+import os
+import select
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from sim_device.acquisition import Setup, State
 from sim_device.errors import Status
 from sim_device.faults import Faults
 from sim_device.memory import Memory
-from sim_device.recorder import Recorder, Setup, State
+from sim_device.recorder import Recorder
 from sim_device.settings import Rig
 from sim_device.tower import Tower
 
@@ -19,10 +21,11 @@ CHANNELS = 1
 
 
 def log(text: str) -> None:
-    """One line on stderr; a log that nobody can take any more stops nothing."""
+    """One line on stderr. A log that nobody takes any more, or not fast enough, stops nothing and loses the line."""
     try:
-        print(f"{time.strftime('%H:%M:%S')} {text}", file=sys.stderr, flush=True)
-    except OSError:
+        if select.select([], [2], [], 0)[1]:
+            os.write(2, f"{time.strftime('%H:%M:%S')} {text}\n".encode())
+    except (OSError, ValueError):
         return
 
 

@@ -6,9 +6,12 @@ series, α₃ the bending of the plate. What is left, α₁ = x − α₂ − α
 
 from __future__ import annotations
 
+import contextlib
 import math
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -22,8 +25,15 @@ FAILURE_DECAY = 10e-6
 """s, time constant with which a failed specimen loses its stiffness, K_i and K_d alike: all force with it."""
 LONGEST_CONTACT = 0.1
 """s; a dart that has not left by then lies on the specimen."""
-RTOL = 1e-11
-ATOL = np.array([1e-6, 1e-3, 1e-7, 1e-7]) * 1e-11
+LEAST_LAG = 1e-10
+"""s; a plate that follows faster (C_d/K_d) is taken to follow at once. That moves ε by less than 1e-6, and the rounding
+of α₁ alone would keep the integrator from ever getting through."""
+TOLERANCES = (1e-11, 1e-9, 1e-7)
+"""Relative, the next for a contact that the one before cannot settle: one so stiff that rounding is in the way."""
+SCALE = np.array([1e-6, 1e-3, 1e-7, 1e-7])
+"""m, m/s, m, m: of the state, times the tolerance, for the absolute one."""
+MOST_STEPS = 40_000
+"""Evaluations of the equations, some twenty times what a contact takes."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +71,8 @@ class Law:
 
     @property
     def bends(self) -> bool:
-        """Whether α₃ is a state of its own (C_d > 0); else it follows from the force at once."""
-        return math.isfinite(self.K_d) and self.C_d > 0
+        """Whether α₃ is a state of its own; else (C_d = 0, or as good as) it follows from the force at once."""
+        return math.isfinite(self.K_d) and self.C_d > LEAST_LAG * self.K_d
 
     def indentation(self, delta: Floats) -> Floats:
         """α₁ in m from δ = α₁ + α₃ in m, where α₃ = F/K_d at once (C_d = 0) or 0 (rigid).
@@ -144,12 +154,19 @@ def _force(law: Law, piece: Piece, t: Floats) -> Floats:
     return law.K_i * alpha1**1.5 * np.exp(-np.maximum(t - piece.failed_at, 0.0) / FAILURE_DECAY)
 
 
+class _NotSettled(ArithmeticError):
+    """The integrator makes no headway."""
+
+
 def _equations(law: Law, failed_at: float, sense: float) -> Callable[[float, Floats], tuple[float, ...]]:
     m, K_i, K_d, C_d, flow = law.m, law.K_i, law.K_d, law.C_d, 1 / law.C_i
     drag = law.friction * sense
     bends = law.bends
+    steps = count()
 
     def equations(t: float, y: Floats) -> tuple[float, ...]:
+        if next(steps) > MOST_STEPS:
+            raise _NotSettled(f"it is too stiff (C_d {C_d:g} kg/s, K_d {K_d:.3g} N/m)")
         x, v, alpha2, alpha3 = y
         left = 1.0 if t < failed_at else math.exp(-(t - failed_at) / FAILURE_DECAY)
         delta = x - alpha2 - alpha3
@@ -164,7 +181,19 @@ def solve(law: Law, v0: float, x0: float = 0.0, alpha2: float = 0.0, alpha3: flo
     """Integrate one contact from touch at displacement ``x0`` with speed ``v0`` (m/s, into the specimen).
 
     LSODA at a relative tolerance of 1e-11: the plate's damper makes the contact stiff (NUMERICS.md).
+
+    Raises
+    ------
+    ArithmeticError
+        The constants make a contact that cannot be integrated.
     """
+    for tolerance in TOLERANCES[:-1]:
+        with contextlib.suppress(_NotSettled):
+            return _solve(law, v0, x0, alpha2, alpha3, tolerance)
+    return _solve(law, v0, x0, alpha2, alpha3, TOLERANCES[-1])
+
+
+def _solve(law: Law, v0: float, x0: float, alpha2: float, alpha3: float, tolerance: float) -> Contact:
     from scipy.integrate import solve_ivp  # half a second to load: not before the first drop
 
     contact = Contact(law, v0, x0, alpha2)
@@ -193,12 +222,13 @@ def solve(law: Law, v0: float, x0: float = 0.0, alpha2: float = 0.0, alpha3: flo
         whole = math.isinf(failed_at)
         events = [parting, turning, failing] if whole and math.isfinite(law.fail_N) else [parting, turning]
         end = LONGEST_CONTACT if whole else failed_at + 40 * FAILURE_DECAY
-        run: Any = solve_ivp(
-            _equations(law, failed_at, sense), (t, end), y, method="LSODA", rtol=RTOL, atol=ATOL,
-            first_step=1e-9, dense_output=True, events=events,
-        )  # fmt: skip
+        with warnings.catch_warnings(action="ignore", category=UserWarning):
+            run: Any = solve_ivp(
+                _equations(law, failed_at, sense), (t, end), y, method="LSODA", rtol=tolerance, atol=tolerance * SCALE,
+                first_step=1e-9, dense_output=True, events=events,
+            )  # fmt: skip
         if run.status < 0:
-            raise ArithmeticError(f"the contact could not be integrated: {run.message}")
+            raise _NotSettled(str(run.message))
         contact.pieces.append(Piece(t, float(run.t[-1]), run.sol, failed_at))
         y, t = run.y[:, -1], float(run.t[-1])
         if len(run.t_events[1]) and contact.t_turn is None:

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import asyncio
-import math
 import time
-import zlib
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from enum import IntEnum
 from typing import Any
 
 from sim_device import stream
+from sim_device.acquisition import Acquisition, Setup, State
 from sim_device.errors import DeviceError
 from sim_device.faults import Faults
 from sim_device.gate import MOST_EDGES
@@ -23,76 +20,6 @@ LOOK_AHEAD_NS = 250_000_000
 """How far ahead the comparator looks at noise alone, when its level lies within it."""
 EDGES_BELONG = 5e9
 """ns after the trigger for which gate edges still belong to its record."""
-
-
-class State(IntEnum):
-    """States of the recorder by their condition register."""
-
-    IDLE = 0
-    MEASURING = 24
-    ARMED = 40
-    FILLING = 72
-    HELD = 256
-
-
-@dataclass(frozen=True)
-class Setup:
-    """Settings of an acquisition, as after reset."""
-
-    interval_ns: int = 1000
-    points: int = 5000
-    pretrigger: int = 500
-    source: str = "INT"
-    level: int = 1000
-    slope: str = "POS"
-    delay_ns: int = 0
-
-    def changed(self, **changes: Any) -> Setup:
-        """A valid setup with some values changed; raises DeviceError −222, −224 or −221."""
-        new = replace(self, **changes)
-        if new.source not in ("INT", "IMM", "EXT") or new.slope not in ("POS", "NEG"):
-            raise DeviceError(-224)
-        within = (
-            1000 <= new.interval_ns <= 2000
-            and 1000 <= new.points <= 1_000_000
-            and new.pretrigger >= 0
-            and -32768 <= new.level <= 32767
-            and 0 <= new.delay_ns <= 1_000_000_000
-        )
-        if not within or ("pretrigger" in changes and new.pretrigger >= new.points):
-            raise DeviceError(-222)
-        if new.pretrigger >= new.points:
-            raise DeviceError(-221)
-        return new
-
-    @property
-    def hash(self) -> int:
-        """Configuration hash."""
-        values = (self.interval_ns, self.points, self.pretrigger, self.source, self.level, self.slope, self.delay_ns)
-        return zlib.crc32(",".join(map(str, values)).encode("ascii"))
-
-    @property
-    def first_ns(self) -> int:
-        """First sample after the trigger, ns."""
-        return self.delay_ns - self.pretrigger * self.interval_ns
-
-
-@dataclass
-class Acquisition:
-    """What one INIT set going. Times in ns of the monotonic clock; the samples stand at origin + k·interval."""
-
-    id: int
-    setup: Setup
-    origin: float
-    edges: list[float] = field(default_factory=list[float])
-    trigger: float | None = None
-    drop: Drop | None = None
-    trigger_after_contact: float = 0.0
-    trigger_index: int = 0
-
-    def index_at(self, at: float) -> int:
-        """Grid index of the next sample after ``at`` ns."""
-        return math.ceil((at - self.origin) / self.setup.interval_ns)
 
 
 class Recorder:
@@ -129,7 +56,13 @@ class Recorder:
         self.acquisition, self.state = run, State.FILLING
         self._contact_input.clear()
         self._task = asyncio.get_running_loop().create_task(self._acquire(run))
+        self._task.add_done_callback(self._ended)
         self._log(f"record {record_id}: filling")
+
+    def _ended(self, task: asyncio.Task[None]) -> None:
+        if not task.cancelled() and (error := task.exception()) is not None:
+            self._log(f"the acquisition broke off: {error!r}")
+            self.forget()
 
     def abort(self) -> None:
         """Filling, armed → idle. A record whose trigger has come goes on to its end."""

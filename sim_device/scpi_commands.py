@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from decimal import Decimal
 
+from sim_device.acquisition import State
 from sim_device.device import CHANNELS, IDENTITY, Device
 from sim_device.errors import OPERATION_COMPLETE, DeviceError
 from sim_device.memory import Record
-from sim_device.recorder import State
 from sim_device.scpi import Command, Interface, block, decimal, integer, word
 
 MOST_SAMPLES = 500_000

@@ -32,7 +32,7 @@ STATES = {
 }
 """The state that an event of the acquisition leaves it in; other events leave it as it is."""
 NOTHING: dict[str, Any] = {
-    "state": "idle", "done": True, "run": None, "text": None, "progress": None, "events": [],
+    "state": "idle", "done": True, "run": None, "text": None, "outcome": None, "progress": None, "events": [],
 }  # fmt: skip
 STARTING = "starting"
 UNNAMED = "unnamed.toml"
@@ -122,15 +122,16 @@ def after(state: str, event: dict[str, Any]) -> str:
 
 def told(events: list[dict[str, Any]]) -> dict[str, Any]:
     """What a row of events amounts to."""
-    state, run, text, progress = STARTING, None, None, None
+    state, run, text, outcome, progress = STARTING, None, None, None, None
     for event in events:
         state = after(state, event)
         run = event.get("run") or run
-        text = event.get("text")
+        text, outcome = event.get("text"), event.get("outcome")
         if event["event"] == "progress":
             progress = {"done": event["done"], "total": event["total"]}
     links = {**ACQUISITION, "run": of_run(run)["self"] if run is not None and state == "saved" else None}
-    return {"state": state, "run": run, "text": text, "progress": progress, "events": events, "links": links}
+    facts = {"state": state, "run": run, "text": text, "outcome": outcome, "progress": progress}
+    return {**facts, "events": events, "links": links}
 
 
 def _sweep(acquisition: Acquisition, folder: Path) -> None:

@@ -82,9 +82,13 @@ def tree_of(test: TestFile) -> dict[str, Any]:
 
 
 def _flat(table: dict[str, Any]) -> dict[str, Any]:
-    u = {f"u_{k}": v for k, v in table.get("u", {}).items()}
-    rest = {k: [_flat(row) for row in v] if k == "channel" else v for k, v in table.items() if k != "u"}
-    return {k: v for k, v in (rest | u).items() if v != []}
+    u = table.get("u", {})
+    flat: dict[str, Any] = {}
+    for key, value in table.items():
+        if key != "u" and value != []:
+            flat[key] = [_flat(row) for row in value] if key == "channel" else value
+            flat |= {f"u_{key}": u[key]} if key in u else {}
+    return flat
 
 
 @router.get("/runs/{run}/raw", response_class=FileResponse)

@@ -75,6 +75,7 @@ GROUPS: dict[str, dict[str, Symbol]] = {
     },
     "Record": {
         "t_contact": _s("t<sub>contact</sub>", "first contact", "On the record's own axis: first sample = 0."),
+        "bounces": _s("n<sub>b</sub>", "bounces", "Contacts after the first that the record holds."),
         "t_second": _s("t<sub>second</sub>", "second contact", "On the record's own axis: first sample = 0."),
         "t_nc": _s("t<sub>nc</sub>", "time of flight", "From the end of contact to the second contact."),
         "t_fall": _s("t<sub>fall</sub>", "fall time", "From release to first contact."),

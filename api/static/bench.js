@@ -22,20 +22,22 @@ const SAYS = {
 };
 const RUNNING = ["starting", "connected", "configured", "waiting", "armed", "triggered", "reading"];
 const DISARMABLE = ["starting", "connected", "configured", "waiting", "armed"];
+const NOTHING_HELD = ["interlock", "no-trigger", "aborted", "RigBusy", "SettingsError"]; // ends that leave no record
 const $ = (id) => document.getElementById(id);
 let stream = null;
 
-function show(state, text = null, progress = null) {
+function show(state, text = null, progress = null, outcome = null) {
   const [mark, word, usual] = SAYS[state];
-  const share = progress && progress.total ? progress.done / progress.total : 0;
+  const share = progress && progress.total ? progress.done / progress.total : null;
   $("banner").dataset.state = state;
   $("state-mark").textContent = mark;
-  $("state-word").textContent = state === "reading" ? `${word} ${Math.floor(100 * share)} %` : word;
+  $("state-word").textContent = state === "reading" && share !== null ? `${word} ${Math.floor(100 * share)} %` : word;
   $("state-text").textContent = text || usual;
   $("progress").hidden = state !== "reading";
-  $("progress").value = share;
+  if (share === null) $("progress").removeAttribute("value"); // a bar that moves without an amount
+  else $("progress").value = share;
   $("arm").disabled = RUNNING.includes(state) || state === "lost" || state === "busy";
-  $("recover").hidden = state !== "failed";
+  $("recover").hidden = state !== "failed" || NOTHING_HELD.includes(outcome);
   $("disarm").disabled = !DISARMABLE.includes(state);
   document.title = `${word} · droptower`;
 }
@@ -56,7 +58,7 @@ function follow() {
   stream = new EventSource(`${PATH}/current/events`);
   stream.onmessage = async ({ data }) => {
     const event = JSON.parse(data);
-    show(event.state, words(event.state, event), event.event === "progress" ? event : null);
+    show(event.state, words(event.state, event), event.event === "progress" ? event : null, event.outcome);
     if (event.event === "saved") await refresh();
     if (event.event === "done" || event.event === "failed") {
       stream?.close();
@@ -69,7 +71,7 @@ function follow() {
 
 async function tell() {
   const now = await askJson(`${PATH}/current`);
-  show(now.state, words(now.state, now), now.progress);
+  show(now.state, words(now.state, now), now.progress, now.outcome);
   return now;
 }
 

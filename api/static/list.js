@@ -3,7 +3,7 @@
 import { ask, askJson } from "./service.js";
 import { ForcePlot } from "./trace.js";
 
-const LOOK_MS = 3000;
+const LOOK_MS = 1500;
 const tried = new Set();
 
 export async function drawNewest() {

@@ -26,6 +26,7 @@ def test_release_hit_bounce_and_flight_time_of_a_real_guided_drop_come_out() -> 
     assert value["t_contact"] + value["t_M"] == pytest.approx(0.13575, abs=1e-4)
     assert value["F_M"] == pytest.approx(640, abs=5)
     assert value["t_second"] == pytest.approx(0.190, abs=5e-4)
+    assert value["bounces"] == 3, "at 0.190, 0.211 and 0.222 s"
     assert value["t_fall"] == pytest.approx(0.0945, abs=1e-3)
     assert value["v0"] == pytest.approx(0.92, abs=0.02)
     assert value["eps_flight"] == pytest.approx(0.287, abs=0.01)

@@ -12,6 +12,7 @@ from rigs import Daq, write_rig, write_test
 
 from api.answer import answer_of
 from daq.chunks import Chunks
+from daq.readout import CHUNK
 from daq.store import Store
 
 
@@ -44,7 +45,7 @@ def slow() -> Iterator[Emulator]:
 def test_a_killed_host_goes_on_where_it_stopped(wire: str, slow: Emulator, tmp_path: Path, data: Path) -> None:
     daq = start(slow, tmp_path, "acquire", wire, 100_000)
     run = drop(daq, slow)
-    assert daq.until("progress")["done"] == 25_000
+    assert daq.until("progress")["done"] == CHUNK
     daq.until("progress")
     daq.kill()
     again = start(slow, tmp_path, "recover", wire, 100_000)
@@ -53,7 +54,7 @@ def test_a_killed_host_goes_on_where_it_stopped(wire: str, slow: Emulator, tmp_p
     daq.close()
     assert end["run"] == run
     progress = [e["done"] for e in again.events if e["event"] == "progress"]
-    assert progress == [25_000, 50_000, 75_000, 100_000]
+    assert progress == [CHUNK * i for i in range(1, 100_000 // CHUNK + 1)]
     sent = [e["at"] for e in again.events if e["event"] == "progress"]
     assert sent[1] < sent[2], "the first two are from the note, the rest from the wire"
     assert Store(data).read(run).missing == 0
@@ -141,8 +142,8 @@ def test_a_record_that_the_recorder_lost_is_kept_as_far_as_it_was_read(tmp_path:
         again.close()
     assert end["run"] == run
     kept = Store(data).read(run)
-    assert kept.missing == 75_000
-    assert kept.channels[0].gaps == ((25_000, 75_000),)
+    assert kept.missing == 100_000 - CHUNK
+    assert kept.channels[0].gaps == ((CHUNK, 100_000 - CHUNK),)
 
 
 def test_chunks_come_back_but_for_a_torn_or_damaged_one(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import httpx2
 import pytest
+from fastapi import FastAPI
 from rigs import TEST, write_rig
 from services import drop, publish, running
 
@@ -25,6 +26,15 @@ def locked(tmp_path: Path) -> Iterator[httpx2.Client]:
         yield client
 
 
+@pytest.fixture(scope="module")
+def rigged(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[FastAPI, str]]:
+    """A service with a rig that nothing answers for, and its address."""
+    folder = tmp_path_factory.mktemp("rigged")
+    app = create_app(folder, write_rig(folder, "socket://127.0.0.1:1", "scpi"))
+    with running(app) as address:
+        yield app, address
+
+
 @pytest.mark.parametrize("host", ["evil.example", "127.0.0.1.evil.example", "127.0.0.2", "", "localhost@evil.example"])
 def test_a_request_for_another_host_is_refused(client: httpx2.Client, host: str) -> None:
     assert client.get("/api/v1/runs", headers={"Host": host}).status_code == 400
@@ -41,14 +51,14 @@ def test_a_request_for_another_host_is_refused(client: httpx2.Client, host: str)
     ],
 )
 @pytest.mark.parametrize("method", ["POST", "DELETE"])
-def test_another_sites_page_cannot_arm_or_disarm(tmp_path: Path, headers: dict[str, str], method: str) -> None:
-    rig = write_rig(tmp_path, "socket://127.0.0.1:1", "scpi")
-    app = create_app(tmp_path, rig)
+def test_another_sites_page_cannot_arm_or_disarm(
+    rigged: tuple[FastAPI, str], headers: dict[str, str], method: str
+) -> None:
+    app, address = rigged
     path = {"POST": "/api/v1/acquisitions", "DELETE": "/api/v1/acquisitions/current"}[method]
-    with running(app) as address, httpx2.Client(base_url=address) as client:
-        answer = client.request(method, path, headers=headers, json={"test": TEST})
-        assert (answer.status_code, answer.json()["error"]["code"]) == (403, "cross-site")
-        assert app.state.service.bench.current is None
+    answer = httpx2.request(method, f"{address}{path}", headers=headers, json={"test": TEST})
+    assert (answer.status_code, answer.json()["error"]["code"]) == (403, "cross-site")
+    assert app.state.service.bench.current is None
 
 
 def test_every_answer_has_the_headers_that_keep_a_page_to_itself(client: httpx2.Client) -> None:
@@ -61,11 +71,11 @@ def test_every_answer_has_the_headers_that_keep_a_page_to_itself(client: httpx2.
 
 
 @pytest.mark.parametrize("content", [b"x" * 300_000, iter([b"x" * 300_000])], ids=["length told", "not told"])
-def test_a_body_too_large_is_refused(tmp_path: Path, content: bytes) -> None:
-    rig = write_rig(tmp_path, "socket://127.0.0.1:1", "scpi")
-    with running(create_app(tmp_path, rig)) as address:
-        url = f"{address}/api/v1/acquisitions"
-        assert httpx2.post(url, content=content, headers={"Content-Type": "application/json"}).status_code == 413
+def test_a_body_too_large_is_refused(rigged: tuple[FastAPI, str], content: bytes) -> None:
+    answer = httpx2.post(
+        f"{rigged[1]}/api/v1/acquisitions", content=content, headers={"Content-Type": "application/json"}
+    )
+    assert answer.status_code == 413
 
 
 @pytest.mark.parametrize(

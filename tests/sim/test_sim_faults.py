@@ -54,7 +54,7 @@ def test_the_line_stalls_before_a_byte_and_then_goes_on(shared_emulator: Emulato
     scpi.port.read(5)
     assert time.monotonic() - started < 0.25
     scpi.port.read(1)
-    assert 0.28 < time.monotonic() - started < 1.0
+    assert 0.28 < time.monotonic() - started < 5.0
 
 
 def test_a_stall_holds_on_a_pty_too(shared_emulator: Emulator):
@@ -62,7 +62,7 @@ def test_a_stall_holds_on_a_pty_too(shared_emulator: Emulator):
         shared_emulator.do("fault", name="stall", nth=1, seconds=0.3)
         started = time.monotonic()
         assert scpi.ask("*OPC?") == "1"
-        assert 0.28 < time.monotonic() - started < 1.0
+        assert 0.28 < time.monotonic() - started < 5.0
 
 
 def test_a_byte_from_the_host_is_lost(shared_emulator: Emulator, scpi: Scpi):
