@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 INSTALL := $(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: setup demo test coverage lint clean
+.PHONY: setup demo test coverage bench lint clean
 setup: .venv/installed
 
 .venv/installed: pyproject.toml constraints.txt
@@ -27,6 +27,10 @@ test: .venv/installed-dev
 # How often the 95 % intervals of the events hold the truth; docs/method.md quotes it.
 coverage: .venv/installed-dev
 	$(BIN)/python bench/coverage_events.py
+
+# Readout against bare loops on the same wires; ten minutes, most of it at 115,200 baud.
+bench: .venv/installed-dev
+	$(BIN)/python bench/wires.py
 
 lint: .venv/installed-dev
 	$(BIN)/ruff check .

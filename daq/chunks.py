@@ -17,14 +17,14 @@ _HEAD = struct.Struct("<IIII")
 
 
 class Chunks:
-    """Chunks of one record, in memory and in `path`. Those of another record found there are thrown away.
+    """Chunks of one record in `path`. Those of another record found there are thrown away.
 
     A disk that does not take them costs only the resuming, so that is not an error here.
     """
 
     def __init__(self, path: Path, record: dict[str, Any]) -> None:
         self.path = path
-        self._found: dict[tuple[int, int], Counts] = {}
+        self._noted: dict[tuple[int, int], Counts] = {}
         title = json.dumps(record, sort_keys=True).encode() + b"\n"
         self._file: BinaryIO | None = None
         try:
@@ -49,7 +49,7 @@ class Chunks:
             samples = np.frombuffer(content[at + _HEAD.size : end], dtype="<i2").astype(np.int16)
             if len(samples) != count or crc32(samples) != crc:
                 break
-            self._found[channel, start] = samples
+            self._noted[channel, start] = samples
             at = end
         return at
 
@@ -62,19 +62,18 @@ class Chunks:
         except (OSError, ValueError):
             return None
 
-    def get(self, channel: int, start: int, count: int) -> Counts | None:
-        """The samples of a chunk, if it was read."""
-        samples = self._found.get((channel, start))
-        return samples if samples is not None and len(samples) == count else None
+    def noted(self) -> list[tuple[tuple[int, int], Counts]]:
+        """Channel and first sample of each chunk, and its samples."""
+        return list(self._noted.items())
 
-    def add(self, channel: int, start: int, samples: Counts) -> None:
-        """Keep a chunk."""
-        self._found[channel, start] = samples
-        head = _HEAD.pack(channel, start, len(samples), crc32(samples))
+    def add(self, channel: int, start: int, samples: Counts, crc: int) -> None:
+        """Note a chunk that has the CRC-32 `crc`."""
+        head = _HEAD.pack(channel, start, len(samples), crc)
         if self._file is None:
             return
         try:
-            self._file.write(head + samples.astype("<i2").tobytes())
+            self._file.write(head)
+            self._file.write(samples.astype("<i2", copy=False).data)
         except OSError:
             self.close()
 

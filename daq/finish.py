@@ -37,8 +37,9 @@ def finish(
     holds it, it is not released, and `recover` tries again.
     """
     device = rig.recorder
-    emit("reading", run=run, samples=header.points * len(header.crcs))
     chunks = journal.chunks(header)
+    noted = sum(len(samples) for _, samples in chunks.noted())
+    emit("reading", run=run, samples=header.points * len(header.crcs), noted=noted)
     try:
         readout = read_record(device, header, chunks, lambda d, n: emit("progress", run=run, done=d, total=n))
     finally:

@@ -65,9 +65,8 @@ class Wire:
         try:
             waiting = self._serial.in_waiting
             self._serial.timeout = patience_s
-            # An exact read of a large block is the fast way on a pty; its time-out covers the whole of it,
-            # so that a large one is read in pieces whose arrival is the progress that is watched.
-            data = self._serial.read(max(waiting, min(wanted, 4096)) if wanted > 1 else max(1, waiting))
+            # An exact read of a large block is the fast way on a pty; what came before its time-out counts as progress.
+            data = self._serial.read(max(waiting, min(wanted, 1 << 16)) if wanted > 1 else max(1, waiting))
         except (serial.SerialException, OSError, TypeError) as e:
             # pyserial raises TypeError when another thread or a vanished device has closed the descriptor.
             raise LinkError(f"port {self.port} failed while reading: {e}") from None

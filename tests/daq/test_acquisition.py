@@ -68,7 +68,9 @@ def test_progress_is_told_while_a_record_is_read(start: Start, emulator: Emulato
     drop(daq, emulator)
     daq.end()
     progress = [(e["done"], e["total"]) for e in daq.events if e["event"] == "progress"]
-    assert progress == [(CHUNK * i, 100_000) for i in range(1, 100_000 // CHUNK + 1)]
+    assert progress[0] == (CHUNK, 100_000)
+    assert progress[-1] == (100_000, 100_000)
+    assert progress == sorted(progress)
 
 
 def test_no_trigger_is_bounded_and_the_rig_is_ready_again(start: Start, emulator: Emulator) -> None:

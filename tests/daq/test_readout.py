@@ -13,6 +13,7 @@ from rigs import Daq, write_rig, write_test
 from api.answer import answer_of
 from daq.chunks import Chunks
 from daq.readout import CHUNK
+from daq.recorder import crc32
 from daq.store import Store
 
 
@@ -53,10 +54,12 @@ def test_a_killed_host_goes_on_where_it_stopped(wire: str, slow: Emulator, tmp_p
     again.close()
     daq.close()
     assert end["run"] == run
+    reading = next(e for e in again.events if e["event"] == "reading")
+    assert reading["noted"] == 2 * CHUNK, "so much need not be read again"
     progress = [e["done"] for e in again.events if e["event"] == "progress"]
-    assert progress == [CHUNK * i for i in range(1, 100_000 // CHUNK + 1)]
-    sent = [e["at"] for e in again.events if e["event"] == "progress"]
-    assert sent[1] < sent[2], "the first two are from the note, the rest from the wire"
+    assert progress[:2] == [CHUNK, 2 * CHUNK]
+    assert progress == sorted(progress)
+    assert progress[-1] == 100_000
     assert Store(data).read(run).missing == 0
     assert list((data / "armed").iterdir()) == []
 
@@ -151,20 +154,20 @@ def test_chunks_come_back_but_for_a_torn_or_damaged_one(tmp_path: Path) -> None:
     samples = np.arange(1000, dtype=np.int16)
     chunks = Chunks(path, record)
     for start_at in (0, 1000, 2000):
-        chunks.add(1, start_at, samples)
+        chunks.add(1, start_at, samples, crc32(samples))
     chunks.close()
     content = path.read_bytes()
     path.write_bytes(content[:-10])
     again = Chunks(path, record)
-    assert [again.get(1, s, 1000) is not None for s in (0, 1000, 2000)] == [True, True, False]
+    assert [key for key, _ in again.noted()] == [(1, 0), (1, 1000)]
     again.close()
     path.write_bytes(content[:100] + b"\xff" + content[101:])
     again = Chunks(path, record)
-    assert again.get(1, 0, 1000) is None
+    assert again.noted() == []
     again.close()
     path.write_bytes(content)
     other = Chunks(path, {"identity": "y"})
-    assert other.get(1, 0, 1000) is None
+    assert other.noted() == []
     other.remove()
     assert not path.exists()
 
@@ -172,6 +175,6 @@ def test_chunks_come_back_but_for_a_torn_or_damaged_one(tmp_path: Path) -> None:
 def test_a_disk_that_takes_no_chunks_costs_no_record(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
     chunks = Chunks(tmp_path / "file" / "a.chunks", {})
-    chunks.add(1, 0, np.zeros(10, dtype=np.int16))
-    assert chunks.get(1, 0, 10) is not None
+    chunks.add(1, 0, np.zeros(10, dtype=np.int16), 0)
+    assert chunks.noted() == []
     chunks.remove()

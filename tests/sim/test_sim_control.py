@@ -172,3 +172,24 @@ def test_it_goes_on_when_nobody_reads_its_output():
     with Scpi(emulator.endpoints["scpi_tcp"]) as scpi:
         assert scpi.ask("*OPC?") == "1"
     assert emulator.stop() == 0
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_a_log_that_nobody_reads_stops_nothing(closed):
+    run = subprocess.Popen(
+        [sys.executable, "-m", "sim_device"], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    assert run.stdout is not None
+    assert run.stderr is not None
+    control = json.loads(run.stdout.readline())["control"]
+    if closed:
+        run.stderr.close()
+    with socket.create_connection(address(control), timeout=10) as client, client.makefile("rb") as answers:
+        # A pipe takes 64 KiB.
+        for _ in range(1500):
+            client.sendall(b'{"do": "specimen", "E_GPa": 3.3, "nu": 0.3, "thickness_mm": 4.6, "C_i": 8000}\n')
+            assert json.loads(answers.readline())["ok"]
+    run.terminate()
+    assert run.wait(10) == 0
+    run.stdout.close()
+    run.stderr.close()

@@ -113,6 +113,21 @@ def test_the_damper_fades_continuously_into_none():
     assert motion(C_d=1e-4).truth()["t_c"] == pytest.approx(without["t_c"], rel=1e-6)
 
 
+@pytest.mark.parametrize("C_d", [1e-6, 1.01e-10 * 65_200])
+def test_a_plate_as_good_as_undamped_is_played_in_finite_time(C_d):
+    # The second case was once caught integrating its own rounding for ever.
+    constants = {
+        "E_GPa": 0.325544,
+        "nu": 0.064767,
+        "thickness_mm": 2.96777,
+        "support_radius_mm": 13.8125,
+        "C_i": 32_547.5,
+    }
+    dart = Dart(mass_kg=4.563, tip_radius_mm=5.9, friction_N=3.7)
+    truth = motion(1.836, dart=dart, C_d=C_d, **constants).truth()
+    assert truth["F_M"] == pytest.approx(motion(1.836, dart=dart, C_d=0, **constants).truth()["F_M"], rel=1e-6)
+
+
 def test_a_stiff_dashpot_fades_into_none():
     assert motion(C_i=1e12).truth()["eps_exact"] == pytest.approx(motion(C_i=None).truth()["eps_exact"], rel=1e-7)
 
