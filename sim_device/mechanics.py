@@ -214,7 +214,7 @@ def _solve(law: Law, v0: float, x0: float, alpha2: float, alpha3: float, toleran
 
     # solve_ivp reads what an event does from attributes of the function.
     for event, direction, terminal in ((parting, -1.0, True), (failing, 1.0, True), (turning, -1.0, law.friction > 0)):
-        setattr(event, "terminal", terminal)  # noqa: B010
+        setattr(event, "terminal", terminal)  # noqa: B010  solve_ivp reads attributes that a function type has not
         setattr(event, "direction", direction)  # noqa: B010
 
     while True:

@@ -96,8 +96,8 @@ def plate(
     def over(_: float, y: Array) -> float:
         return float(y[2])
 
-    over.terminal = True  # type: ignore[attr-defined]
-    over.direction = -1  # type: ignore[attr-defined]
+    over.terminal = True
+    over.direction = -1
     sol = solve_ivp(rates, (0, 0.05), [v0, 0, 0, 0, 0, 0], events=over, method="Radau" if C_d else "DOP853",
                     rtol=1e-10, atol=[1e-10, 1e-14, 1e-14, 1e-14, 1e-12, 1e-12], dense_output=True)  # fmt: skip
     t_c = float(sol.t_events[0][0])
@@ -163,4 +163,4 @@ def impact(drop: Drop, **more: object) -> Impact:
     """Conditions that fit `drop`."""
     given: dict[str, object] = {"mass": drop.mass, "tip_radius": 6.35e-3, "thickness": 4.6e-3, "nu": 0.3,
                                 "support": "ring", "support_radius": 0.03, "v0": drop.v0}  # fmt: skip
-    return Impact(**(given | more))  # type: ignore[arg-type]
+    return Impact(**(given | more))

@@ -18,7 +18,7 @@ IMPACT = drops.impact(DROP)
 
 
 def noisy(**more: float) -> Record:
-    return drops.record(DROP, drops.Recorder(noise=0.003, **more), np.random.default_rng(2))[0]  # type: ignore[arg-type]
+    return drops.record(DROP, drops.Recorder(noise=0.003, **more), np.random.default_rng(2))[0]
 
 
 def codes(found: Findings) -> set[str]:

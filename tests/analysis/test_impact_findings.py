@@ -30,7 +30,7 @@ def values(found: Findings) -> dict[str, float]:
 
 
 def clean(drop: drops.Drop = FLEXED, seed: int = 1, **recorder: float) -> tuple[Record, float]:
-    return drops.record(drop, drops.Recorder(**recorder), np.random.default_rng(seed))  # type: ignore[arg-type]
+    return drops.record(drop, drops.Recorder(**recorder), np.random.default_rng(seed))
 
 
 @pytest.mark.parametrize("drop", drops.shapes().values(), ids=lambda d: d.name)

@@ -19,10 +19,3 @@ def shared_emulator(_one_emulator: Emulator) -> Emulator:
     """One process for the whole session, idle and with the default rig (catcher on) for every test."""
     _one_emulator.fresh()
     return _one_emulator
-
-
-@pytest.fixture
-def emulator() -> Iterator[Emulator]:
-    """A process of its own for the test."""
-    with Emulator("--seed", "7") as running:
-        yield running

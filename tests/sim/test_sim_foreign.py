@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 import re
-import shutil
 import subprocess
 
 import numpy as np
 import pytest
+import pyvisa
 from clients import Scpi, record, take
 from emulator import Emulator, address
-
-mbpoll = pytest.mark.skipif(shutil.which("mbpoll") is None, reason="mbpoll is not installed")
+from records import need
 
 
 def polled(arguments: list[str]) -> list[int]:
     """Values that mbpoll prints, in order."""
     run = subprocess.run(
-        ["mbpoll", "-1", "-q", "-0", "-a", "1", *arguments], capture_output=True, text=True, timeout=20
+        [need("mbpoll"), "-1", "-q", "-0", "-a", "1", *arguments], capture_output=True, text=True, timeout=20
     )
     assert run.returncode == 0, run.stdout + run.stderr
     return [int(value) for value in re.findall(r"^\[\d+\]:\s+(-?\d+)", run.stdout, re.MULTILINE)]
 
 
-@mbpoll
 def test_mbpoll_reads_sentinels_over_tcp(shared_emulator: Emulator):
     host, port = address(shared_emulator.endpoints["modbus_tcp"])
     assert polled(["-m", "tcp", "-p", str(port), "-t", "3", "-r", "0", "-c", "5", host]) == [258, 258, 772, 1, 16]
@@ -31,7 +29,6 @@ def test_mbpoll_reads_sentinels_over_tcp(shared_emulator: Emulator):
     assert long_words == [0x01020304]
 
 
-@mbpoll
 def test_mbpoll_reads_sentinels_over_rtu(shared_emulator: Emulator):
     path = shared_emulator.endpoints["modbus_rtu"]
     line = ["-m", "rtu", "-b", "115200", "-P", "none", "-t", "3"]
@@ -41,8 +38,6 @@ def test_mbpoll_reads_sentinels_over_rtu(shared_emulator: Emulator):
 
 @pytest.mark.parametrize("wire", ["tcp", "pty"])
 def test_pyvisa_identifies_the_device_and_reads_a_block(shared_emulator: Emulator, wire):
-    pyvisa = pytest.importorskip("pyvisa")
-    pytest.importorskip("pyvisa_py")
     ends = shared_emulator.endpoints
     with Scpi(ends["scpi_tcp"]) as scpi:
         take(shared_emulator, scpi)
