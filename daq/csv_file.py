@@ -31,7 +31,7 @@ def read_csv(text: str, path: Path) -> Table:
         )
     clock = next((i for i, n in enumerate(names) if quantity(n) == "time"), None)
     if clock is None:
-        raise ImportFileError(f"{path}, line {head + 1}: no time column (time_s) among {', '.join(names)}")
+        raise ImportFileError(f"{path}, line {head + 1}: no time column (time_s) among {', '.join(names)[:80]!r}")
     if units[clock].lower() not in TIME:
         raise ImportFileError(
             f"{path}, line {head + 1}: time needs a unit in its name (time_s, time_ms, time_us), not {units[clock]!r}"

@@ -100,6 +100,8 @@ def parse_rows(
     """
     while lines and not lines[-1].strip():
         lines.pop()
+    if len(lines) < FEWEST:
+        raise ImportFileError(f"{path}: {len(lines)} samples; a record needs at least {FEWEST}")
     text = lines if decimal == "." else [line.replace(decimal, ".") for line in lines]
     try:
         values = np.loadtxt(text, delimiter=delimiter, usecols=columns, dtype=np.float64, ndmin=2, comments=None)
@@ -136,8 +138,6 @@ def time_step(time: NDArray[np.float64], first: int, path: Path) -> float:
     ------
     ImportFileError : time stands still, runs back, or has a gap; names the line.
     """
-    if len(time) < FEWEST:
-        raise ImportFileError(f"{path}: {len(time)} samples; a record needs at least {FEWEST}")
     steps = np.diff(time)
     back = np.flatnonzero(steps <= 0)
     if len(back):

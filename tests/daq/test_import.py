@@ -71,6 +71,8 @@ def _line(number: int, text: str) -> Callable[[list[str]], list[str]]:
         (lambda lines: [*lines[:100], *lines[99:]], ["line 101", "time stands still"]),
         (lambda lines: lines[1:], ["line 1", "header is missing"]),
         (lambda lines: lines[:10], ["9 samples", "at least 16"]),
+        (lambda lines: lines[:1], ["0 samples", "at least 16"]),
+        (lambda lines: ["\x1b[31m,\x07", *lines[1:]], ["no time column", "'\\x1b[31m"]),
         (lambda lines: [], ["empty"]),
         (lambda lines: ["no table here", "at all"], ["line 1", "no columns"]),
         (_line(1, "time_s,volts_V"), ["no force column", "[[import.channel]]"]),
