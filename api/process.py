@@ -29,12 +29,13 @@ class Acquisition:
         self,
         do: str,
         rig: Path,
-        data: Path,
+        data: Path | None,
         test: Path | None = None,
         series: str | None = None,
         give_up: bool = False,
     ) -> None:
-        command = [sys.executable, "-m", "daq", do, "--rig", str(rig), "--data", str(data)]
+        command = [sys.executable, "-m", "daq", do, "--rig", str(rig)]
+        command += ["--data", str(data)] if data is not None else []
         command += ["--test", str(test)] if test is not None else []
         command += [f"--series={series}"] if series is not None else []
         command += ["--give-up"] if give_up else []

@@ -1,4 +1,4 @@
-"""`python -m daq acquire|recover`: acquisition as a process of its own, its events as JSON lines on stdout.
+"""`python -m daq acquire|recover|check`: acquisition as a process of its own, its events as JSON lines on stdout.
 
 SIGINT and SIGTERM disarm a recorder that waits for its trigger; a record that has come is read and saved first.
 Exit 0: a run is saved; 1: the last event, `failed`, says why not.
@@ -14,7 +14,8 @@ from types import FrameType
 from typing import Any
 
 from daq.acquisition import acquire
-from daq.errors import AcquisitionError, DaqError
+from daq.checking import check
+from daq.errors import AcquisitionError, DaqError, DeviceError
 from daq.lock import RigLock
 from daq.recovery import recover
 from daq.rig import Rig
@@ -38,10 +39,10 @@ def _emit(event: str, **facts: Any) -> None:
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m daq", description=__doc__)
-    parser.add_argument("do", choices=["acquire", "recover"])
+    parser.add_argument("do", choices=["acquire", "recover", "check"])
     parser.add_argument("--rig", type=Path, required=True)
     parser.add_argument("--test", type=Path, help="needed to acquire")
-    parser.add_argument("--data", type=Path, required=True)
+    parser.add_argument("--data", type=Path, help="needed to acquire and recover")
     parser.add_argument("--series")
     parser.add_argument(
         "--give-up", action="store_true", help="release a record of which a partial run is all there is"
@@ -49,14 +50,20 @@ def _arguments() -> argparse.Namespace:
     given = parser.parse_args()
     if given.do == "acquire" and given.test is None:
         parser.error("acquire needs --test")
+    if given.do != "check" and given.data is None:
+        parser.error(f"{given.do} needs --data")
     return given
 
 
 def _run(given: argparse.Namespace) -> str | None:
     file, rig_text = load_rig(given.rig)
     test = load_test(given.test) if given.test is not None else None
-    store = Store(given.data)
     with RigLock(file, given.do), Rig(file) as rig:
+        if given.do == "check":
+            if not check(rig, _emit):
+                raise DeviceError("the rig is not ready: see the checks")
+            return None
+        store = Store(given.data)
         if given.do == "recover":
             return recover(rig, rig_text, test, store, _emit, given.give_up)
         assert test is not None, "the arguments were checked"

@@ -120,7 +120,7 @@ class Catalog:
             test = data.test
             yield (
                 run, data.series, data.started, data.source, test.specimen.id, test.specimen.material,
-                test.operator.batch, data.points, 1 / data.dt, self._store.sha256(run), data.missing, None,
+                test.operator.batch, data.points, round(1 / data.dt, 6), self._store.sha256(run), data.missing, None,
             )  # fmt: skip
 
 

@@ -37,6 +37,32 @@ def recover(
     _take(Acquisition("recover", rig, data, test, give_up=give_up), data, as_json)
 
 
+def check(rig: Annotated[Path, typer.Argument(help="Rig file.", metavar="RIG.toml")], as_json: Json = False) -> None:
+    """Look at the rig before the first specimen: identity, settings, interlock, gate, noise, link speed."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from api.process import Acquisition
+
+    acquisition = Acquisition("check", rig, None)
+    end = acquisition.result()
+    rows = [{k: e[k] for k in ("name", "ok", "text")} for e in acquisition.events if e["event"] == "check"]
+    good = end["event"] == "done"
+    if as_json:
+        print_json({"rig": str(rig), "ok": good, "checks": rows})
+    elif rows:
+        table = Table(title=str(rig), title_justify="left")
+        for title in ("", "check", "found"):
+            table.add_column(title)
+        for row in rows:
+            mark = "[bold green]good[/]" if row["ok"] else "[bold red]BAD[/]"
+            table.add_row(mark, row["name"], row["text"])
+        Console().print(table)
+    if not good:
+        tell(f"droptower: {end['text']}")
+        raise typer.Exit(1)
+
+
 def sim(
     state: Annotated[Path | None, typer.Option(help="File that keeps record memory and boot counter.")] = None,
     scenario: Annotated[Path | None, typer.Option(help="TOML file with the rig to play.")] = None,

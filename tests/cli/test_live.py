@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 from emulator import Emulator, until
 from rigs import write_rig, write_test
@@ -37,6 +38,38 @@ def test_acquire_follows_the_drop_and_answers(tmp_path: Path) -> None:
     found = answer["findings"]
     for symbol in ("F_M", "alpha_M", "t_c", "eps_exact", "v0", "v1"):
         assert abs(found[symbol]["value"] - truth[symbol]) < 5 * found[symbol]["u"], symbol
+
+
+def _checked(rig: Path) -> tuple[int, dict[str, Any]]:
+    done = subprocess.run([DROPTOWER, "check", rig, "--json"], capture_output=True, text=True)
+    assert "Traceback" not in done.stderr
+    return done.returncode, json.loads(done.stdout)
+
+
+def test_check_looks_at_the_rig_without_a_drop(tmp_path: Path) -> None:
+    with Emulator("--seed", "3", "--baud", "921600") as emulator:
+        for wire in ("scpi_pty", "modbus_rtu", "modbus_tcp"):
+            rig = write_rig(tmp_path, emulator.endpoints[wire], wire.partition("_")[0])
+            rig.write_text(rig.read_text().replace("sample_rate_Hz", "baud = 921600\nsample_rate_Hz"))
+            code, answer = _checked(rig)
+            assert (code, answer["ok"]) == (0, True), answer
+            rows = {row["name"]: row["text"] for row in answer["checks"]}
+            assert "noise 3" in rows["noise"] or "noise 2.9" in rows["noise"], "the emulator's 3 N"
+            assert "door closed" in rows["interlock"]
+        # no record of the check is left that would stand in the way of a drop
+        assert "idle" in json.dumps(emulator.do("status")["state"])
+
+
+def test_check_tells_what_is_not_ready(tmp_path: Path) -> None:
+    with Emulator("--seed", "3") as emulator:
+        rig = write_rig(tmp_path, emulator.endpoints["scpi_tcp"], "scpi")
+        rig.write_text(rig.read_text().replace("trigger_level = 60", "trigger_level = 15"))
+        emulator.do("door", open=True)
+        code, answer = _checked(rig)
+        bad = {row["name"]: row["text"] for row in answer["checks"] if not row["ok"]}
+        assert (code, answer["ok"], sorted(bad)) == (1, False, ["interlock", "noise"])
+        assert "door open" in bad["interlock"]
+        assert "noise will trigger" in bad["noise"]
 
 
 def test_ctrl_c_disarms(tmp_path: Path) -> None:

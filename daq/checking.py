@@ -1,0 +1,146 @@
+"""Is the rig ready? Identity, settings, interlock, gate, noise and link speed, before any specimen is there."""
+
+import time
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+
+from daq.acquisition import settle
+from daq.errors import AcquisitionError, DeviceError, LinkError
+from daq.finish import POLL_S, Emit
+from daq.readout import again
+from daq.recorder import Condition, Counts, Device, Header, Interlock, Settings
+from daq.rig import Rig, wanted_settings
+from daq.rig_file import RigFile
+
+NOISE_POINTS = 20_000
+"""Samples that noise and speed are measured on: four seconds of a line at 115,200 baud."""
+CLEAR_OF_NOISE = 6.0
+"""Standard deviations that the trigger level has to stand off the zero level: nearer, noise triggers within minutes."""
+SLOW = 0.5
+"""Share of the line's ceiling below which a cable, an adapter or a setting is at fault."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """One row: what was looked at, whether it is as it should be, and what was found."""
+
+    name: str
+    ok: bool
+    text: str
+
+
+def check(rig: Rig, emit: Emit) -> bool:
+    """Look at everything that can be looked at without a drop; each row goes out as an event. Whether all is well.
+
+    Raises
+    ------
+    AcquisitionError : the recorder holds a record that was never saved; it is left alone.
+    LinkError, DeviceError : the recorder does not answer.
+    """
+    device = rig.recorder
+    status = settle(device, emit)
+    if status.held:
+        raise AcquisitionError("held", f"the recorder holds record {status.held}; `droptower recover` saves it first")
+    rows = [
+        Check("identity", True, rig.identity),
+        Check("known word", True, "byte and word order are settled by the device's known word"),
+        _settings(device, wanted_settings(rig.file)),
+        *_interlock(rig),
+        *_gate(rig),
+    ]
+    if rows[2].ok:
+        rows += _quiet_record(device, rig.file)
+    for row in rows:
+        emit("check", **asdict(row))
+    return all(row.ok for row in rows)
+
+
+def _settings(device: Device, wanted: Settings) -> Check:
+    try:
+        device.configure(wanted)
+        found = again(device, device.settings)
+    except DeviceError as e:
+        return Check("settings", False, f"{e}; change them in the rig file")
+    differ = [f"{k}: asked {v}, got {found.__dict__[k]}" for k, v in wanted.__dict__.items() if v != found.__dict__[k]]
+    took = f"{1e9 / wanted.interval_ns:g} Hz, {wanted.points} samples, {wanted.pretrigger} before the trigger"
+    return Check("settings", not differ, "; ".join(differ) or took)
+
+
+def _interlock(rig: Rig) -> list[Check]:
+    if rig.interlock is None:
+        return []
+    bits = again(rig.interlock, rig.interlock.interlock)
+    words = [
+        "door closed" if Interlock.DOOR_CLOSED in bits else "door open",
+        "dart clamped" if Interlock.CLAMPED in bits else "dart not clamped",
+        "catcher on" if Interlock.CATCHER_ON in bits else "catcher off",
+    ]
+    return [Check("interlock", Interlock.READY in bits, ", ".join(words))]
+
+
+def _gate(rig: Rig) -> list[Check]:
+    if rig.gate is None:
+        return []
+    try:
+        free = again(rig.gate, rig.gate.beam_free)
+    except LinkError as e:
+        return [Check("gate", False, str(e))]
+    return [Check("gate", free, "the beam is free" if free else "the beam is broken: clear it, or align the gate")]
+
+
+def _quiet_record(device: Device, file: RigFile) -> list[Check]:
+    """A record of nothing, triggered at once and let go again: noise, zero level, pre-trigger and link speed."""
+    wanted = wanted_settings(file)
+    points = max(wanted.pretrigger + 1, min(wanted.points, NOISE_POINTS))
+    quiet = replace(wanted, source="IMM", points=points)
+    device.configure(quiet)
+    device.arm()
+    end = time.monotonic() + 2 * points * quiet.interval_ns * 1e-9 + 5.0
+    while not again(device, device.status).condition & Condition.HELD:
+        if time.monotonic() > end:
+            device.abort()
+            return [Check("record", False, "a record triggered at once does not come to its end")]
+        time.sleep(POLL_S)
+    header = again(device, device.header)
+    started = time.monotonic()
+    samples = again(device, lambda: device.read(1, 0, points))
+    took = time.monotonic() - started
+    device.acknowledge(header.record_id, header.crcs[0])
+    return [_pretrigger(header, quiet), _noise(samples, quiet, file), _speed(2 * points / took, file)]
+
+
+def _pretrigger(header: Header, asked: Settings) -> Check:
+    first = asked.delay_ns - asked.pretrigger * asked.interval_ns
+    text = f"first sample {header.first_sample_ns * 1e-6:g} ms from the trigger, {first * 1e-6:g} ms asked for"
+    return Check("pre-trigger", header.first_sample_ns == first, text)
+
+
+def _noise(samples: Counts, settings: Settings, file: RigFile) -> Check:
+    channel = file.recorder.channel[0]
+    zero, noise = float(np.mean(samples)), float(np.std(samples))
+    apart = (settings.level - zero) * (1 if settings.slope == "POS" else -1)
+    scale = abs(channel.counts_to_unit)
+    text = (
+        f"noise {noise * scale:.3g} {channel.unit}, zero level {zero * channel.counts_to_unit + channel.offset:.3g} "
+        f"{channel.unit}, trigger level {apart * scale:.3g} {channel.unit} away"
+    )
+    if apart <= CLEAR_OF_NOISE * noise:
+        text += f"; set it {CLEAR_OF_NOISE:g} times the noise away at the least, or noise will trigger"
+    return Check("noise", apart > CLEAR_OF_NOISE * noise, text)
+
+
+def _speed(rate: float, file: RigFile) -> Check:
+    """Bytes of samples a second against what the line can carry; a network has no ceiling that is known here."""
+    r = file.recorder
+    found = f"{rate / 1e3:.1f} kB/s of samples"
+    if r.port.startswith(("socket://", "tcp://")):
+        return Check("link", True, f"{found} over the network")
+    characters = r.baud / 10
+    if r.driver == "modbus":
+        silence = 1.75e-3 if r.baud > 19200 else 3.5 / characters
+        ceiling = 250 / ((255 + 8) / characters + 2 * silence)
+    else:
+        ceiling = characters
+    share = rate / ceiling
+    return Check("link", share >= SLOW, f"{found}, {100 * min(share, 1):.0f} % of what {r.baud} baud can carry")
