@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 INSTALL := $(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: setup demo test coverage bench lint clean
+.PHONY: setup demo test coverage bench kills lint clean
 setup: .venv/installed
 
 .venv/installed: pyproject.toml constraints.txt
@@ -31,6 +31,11 @@ coverage: .venv/installed-dev
 # Readout against bare loops on the same wires; ten minutes, most of it at 115,200 baud.
 bench: .venv/installed-dev
 	$(BIN)/python bench/wires.py
+
+# The host killed a thousand times, at every step of a drop; half an hour. CI runs 40.
+KILLS ?= 1000
+kills: .venv/installed-dev
+	$(BIN)/python bench/kills.py --kills $(KILLS)
 
 lint: .venv/installed-dev
 	$(BIN)/ruff check .
