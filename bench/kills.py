@@ -2,8 +2,8 @@
 
     .venv/bin/python bench/kills.py [--kills 1000] [--seed 1]
 
-Each drop is a real one on the emulator. All steps are hit alike, up to 30 ms after the step was told; `recover` then has to
-leave exactly one whole run of the record, the recorder released, and what was reported saved unchanged. Prints the
+Each drop is a real one on the emulator. All steps are hit alike, up to 30 ms after they were told; `recover` then has
+to leave exactly one whole run of the record, the recorder released, and what was reported saved unchanged. Prints the
 histogram; exit 1 if anything was lost.
 """
 
