@@ -20,7 +20,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "analysis")]
 
 import drops  # noqa: E402  the tests' own generator, found by the path above
 
-from analysis import analyze  # noqa: E402
+from analysis import analyze  # noqa: E402  after the path, like drops
 
 SYMBOLS = ("t_contact", "t_c", "eps_exact", "F_M")
 

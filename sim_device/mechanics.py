@@ -214,11 +214,11 @@ def _solve(law: Law, v0: float, x0: float, alpha2: float, alpha3: float, toleran
 
     # solve_ivp reads what an event does from attributes of the function.
     for event, direction, terminal in ((parting, -1.0, True), (failing, 1.0, True), (turning, -1.0, law.friction > 0)):
-        setattr(event, "terminal", terminal)  # noqa: B010  solve_ivp reads attributes that a function type has not
-        setattr(event, "direction", direction)  # noqa: B010
+        setattr(event, "terminal", terminal)  # noqa: B010  a function type has no such attribute
+        setattr(event, "direction", direction)  # noqa: B010  as above
 
     while True:
-        setattr(turning, "direction", -sense)  # noqa: B010
+        setattr(turning, "direction", -sense)  # noqa: B010  as above
         whole = math.isinf(failed_at)
         events = [parting, turning, failing] if whole and math.isfinite(law.fail_N) else [parting, turning]
         end = LONGEST_CONTACT if whole else failed_at + 40 * FAILURE_DECAY
