@@ -9,20 +9,25 @@ import importlib
 import json
 import os
 import selectors
+import shutil
 import signal
 import sys
+import tempfile
 import threading
 from pathlib import Path
 
 from sim_device import tcp
-from sim_device.control import LONGEST_REQUEST, Control
+from sim_device.control import LONGEST_REQUEST, Control, set_fault
 from sim_device.device import Device, log
+from sim_device.fault_kinds import catalogue
 from sim_device.memory import Memory, StateError
 from sim_device.modbus import RtuSession, TcpSession
 from sim_device.scpi import Session
 from sim_device.scpi_commands import SCPI
 from sim_device.settings import Rig, SettingError, load_scenario
 from sim_device.wires import SerialLine
+
+PORTS = "droptower-sim-"
 
 
 def _arguments() -> argparse.Namespace:
@@ -32,6 +37,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--state", type=Path, metavar="FILE", help="record memory and counters, kept over power loss")
     parser.add_argument("--scenario", type=Path, metavar="FILE", help="the rig as it is at the start (TOML)")
     parser.add_argument("--baud", type=int, metavar="N", help="pace of the two serial lines, 8N1 (default: unpaced)")
+    parser.add_argument("--list-faults", action="store_true", help="print the faults it can play, and end")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of noise, jitter and phase (default 0)")
     arguments = parser.parse_args()
     if arguments.baud is not None and not 300 <= arguments.baud <= 10_000_000:
@@ -43,18 +49,20 @@ def _arguments() -> argparse.Namespace:
 
 async def _serve(device: Device, baud: int | None) -> None:
     faults = device.faults
-    scpi_line = SerialLine(lambda: Session(device, SCPI), faults, baud)
-    modbus_line = SerialLine(lambda: RtuSession(device), faults, baud)
-    scpi, scpi_port, scpi_links = await tcp.serve(lambda: Session(device, SCPI), faults)
-    modbus, modbus_port, modbus_links = await tcp.serve(lambda: TcpSession(device), faults)
+    ports = _folder()
+    scpi_line = SerialLine(lambda: Session(device, SCPI), faults, baud, ports / "scpi")
+    modbus_line = SerialLine(lambda: RtuSession(device), faults, baud, ports / "modbus")
+    scpi, modbus = tcp.Port(lambda: Session(device, SCPI), faults), tcp.Port(lambda: TcpSession(device), faults)
+    await scpi.open()
+    await modbus.open()
     control = Control(device)
     hand = await asyncio.start_server(control.serve_client, tcp.HOST, 0, limit=LONGEST_REQUEST)
 
     def close_links() -> None:
         scpi_line.reset()
         modbus_line.reset()
-        for link in [*scpi_links, *modbus_links]:
-            link.close()
+        scpi.cut()
+        modbus.cut()
 
     device.links.append(close_links)
     stop = asyncio.Event()
@@ -63,23 +71,32 @@ async def _serve(device: Device, baud: int | None) -> None:
         loop.add_signal_handler(number, stop.set)
     _announce(
         {
-            "scpi_pty": scpi_line.path,
-            "scpi_tcp": f"socket://{tcp.HOST}:{scpi_port}",
-            "modbus_rtu": modbus_line.path,
-            "modbus_tcp": f"tcp://{tcp.HOST}:{modbus_port}",
+            "scpi_pty": str(scpi_line.path),
+            "scpi_tcp": f"socket://{tcp.HOST}:{scpi.number}",
+            "modbus_rtu": str(modbus_line.path),
+            "modbus_tcp": f"tcp://{tcp.HOST}:{modbus.number}",
             "control": f"socket://{tcp.HOST}:{hand.sockets[0].getsockname()[1]}",
         }
     )
     # The solver takes half a second to load: meanwhile the wires are served already.
     threading.Thread(target=_load_solver, daemon=True).start()
     await stop.wait()
-    for server in (scpi, modbus, hand):
-        server.close()
     device.recorder.forget()
-    close_links()
-    scpi_line.close()
-    modbus_line.close()
+    for end in (scpi, modbus, hand, scpi_line, modbus_line):
+        end.close()
+    shutil.rmtree(ports, ignore_errors=True)
     log("stopped")
+
+
+def _folder() -> Path:
+    """A folder for the serial ports' paths; those of emulators that were killed are swept."""
+    parent = Path(tempfile.gettempdir())
+    for old in parent.glob(f"{PORTS}*"):
+        if not Path(f"/proc/{old.name.removeprefix(PORTS)}").exists():
+            shutil.rmtree(old, ignore_errors=True)
+    folder = parent / f"{PORTS}{os.getpid()}"
+    folder.mkdir(exist_ok=True)
+    return folder
 
 
 def _load_solver() -> None:
@@ -100,9 +117,14 @@ def _announce(endpoints: dict[str, str]) -> None:
 def main() -> int:
     """Run until SIGTERM or SIGINT; 1 if the state or the scenario cannot be used."""
     arguments = _arguments()
+    if arguments.list_faults:
+        print(catalogue())
+        return 0
     try:
-        rig = load_scenario(arguments.scenario) if arguments.scenario is not None else Rig()
+        rig, faults = load_scenario(arguments.scenario) if arguments.scenario is not None else (Rig(), [])
         device = Device(Memory(arguments.state), rig, arguments.seed)
+        for keys in faults:
+            set_fault(device.faults, keys)
     except (SettingError, StateError, OSError) as error:
         print(f"sim_device: {error}", file=sys.stderr)
         return 1

@@ -66,7 +66,10 @@ class Setup:
 
 @dataclass
 class Acquisition:
-    """What one INIT set going. Times in ns of the monotonic clock; the samples stand at origin + k·interval."""
+    """What one INIT set going. Times in ns of the monotonic clock; the samples stand at origin + k·interval.
+
+    ``missing`` and ``clock`` are faults: pre-trigger samples that are not there, true over stated interval.
+    """
 
     id: int
     setup: Setup
@@ -76,6 +79,13 @@ class Acquisition:
     drop: Drop | None = None
     trigger_after_contact: float = 0.0
     trigger_index: int = 0
+    missing: int = 0
+    clock: float = 1.0
+
+    @property
+    def first_ns(self) -> int:
+        """First sample after the trigger, ns; ``missing`` of the pre-trigger samples are not there."""
+        return self.setup.first_ns + self.missing * self.setup.interval_ns
 
     def index_at(self, at: float) -> int:
         """Grid index of the next sample after ``at`` ns."""

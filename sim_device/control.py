@@ -11,6 +11,8 @@ from typing import Any
 
 from sim_device.acquisition import State
 from sim_device.device import Device, log
+from sim_device.fault import Fault
+from sim_device.faults import Faults
 from sim_device.scpi_commands import SCPI
 from sim_device.settings import SettingError, changed, nearest
 from sim_device.tower import Refused
@@ -30,6 +32,10 @@ class Control:
             "specimen": lambda keys: self._part("specimen", keys),
             "dart": lambda keys: self._part("dart", keys),
             "sensor": lambda keys: self._part("sensor", keys),
+            "second_sensor": lambda keys: self._part("second_sensor", keys),
+            "displacement": lambda keys: self._part("displacement", keys),
+            "accelerometer": lambda keys: self._part("accelerometer", keys),
+            "recorder": lambda keys: self._part("recorder", keys),
             "gate": lambda keys: self._part("gate", keys),
             "height": self._height,
             "catcher": lambda keys: self._switch("catcher", "on", keys),
@@ -84,22 +90,14 @@ class Control:
         return {"drop": number, "truth": truth}
 
     def _fault(self, keys: Answer) -> Answer:
-        name = keys.pop("name", None)
-        if isinstance(command := keys.get("command"), str):
-            known = SCPI.find(command)
-            if known is None and not (command[:2] == "FC" and command[2:].isdigit()):
-                raise SettingError(f'command {command!r} is neither an SCPI header nor a Modbus function like "FC04"')
-            keys["command"] = command if known is None else known.name
-        elif command is not None:
-            raise SettingError("command must be text")
-        fault = self._device.faults.add(name, keys)
+        fault = set_fault(self._device.faults, keys)
         log(f"fault set: {fault.name}")
         return {}
 
     def _clear(self, keys: Answer) -> Answer:
+        name = keys.pop("name", None)
         _none(keys)
-        self._device.faults.clear()
-        return {}
+        return {"removed": self._device.faults.clear(name)}
 
     def _reset(self, keys: Answer) -> Answer:
         _none(keys)
@@ -136,6 +134,26 @@ class Control:
                     writer.write(json.dumps(await self.answer(line)).encode() + b"\n")
                     await writer.drain()
         writer.close()
+
+
+def set_fault(faults: Faults, keys: Answer) -> Fault:
+    """Set a fault of a request or a scenario file; its command in any spelling.
+
+    Raises
+    ------
+    SettingError
+        Unknown fault, option or command, or a value beyond its limits.
+    """
+    keys = dict(keys)
+    name = keys.pop("name", None)
+    if isinstance(command := keys.get("command"), str):
+        known = SCPI.find(command)
+        if known is None and not (command[:2] == "FC" and command[2:].isdigit()):
+            raise SettingError(f'command {command!r} is neither an SCPI header nor a Modbus function like "FC04"')
+        keys["command"] = command if known is None else known.name
+    elif command is not None:
+        raise SettingError("command must be text")
+    return faults.add(name, keys)
 
 
 def _none(keys: Answer) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import select
 import time
@@ -11,13 +12,15 @@ from dataclasses import dataclass
 from sim_device.acquisition import Setup, State
 from sim_device.errors import Status
 from sim_device.faults import Faults
-from sim_device.memory import Memory
+from sim_device.memory import Memory, Record
 from sim_device.recorder import Recorder
 from sim_device.settings import Rig
+from sim_device.stream import Counts
 from sim_device.tower import Tower
 
 IDENTITY = "droptower,emulated tower,0001,0.1.0"
-CHANNELS = 1
+OVERFLOWING = 17
+"""Errors, one more than the queue takes."""
 
 
 def log(text: str) -> None:
@@ -53,7 +56,7 @@ class Device:
         self.status = Status()
         self.faults = Faults()
         self.tower = Tower(rig, self.faults, seed, log)
-        self.recorder = Recorder(memory, self.faults, lambda: self.tower.rig, seed, log)
+        self.recorder = Recorder(memory, self.faults, lambda: self.tower.rig, seed, log, self.power_cycle)
         self.tower.recorder = self.recorder
         self.reading = Reading()
         self.links: list[Callable[[], None]] = []
@@ -72,6 +75,30 @@ class Device:
     def setup(self) -> Setup:
         """Settings of the acquisition."""
         return self.recorder.setup
+
+    def struck(self, command: str) -> bool:
+        """Faults that a request sets off; whether it goes unanswered."""
+        if self.faults.strikes("error_overflow", command) is not None:
+            for _ in range(OVERFLOWING):
+                self.status.report(-222)
+        if self.memory.held is not None and self.faults.strikes("overwritten", command) is not None:
+            self.recorder.overwrite()
+        if self.faults.strikes("device_reset", command) is None:
+            return False
+        asyncio.get_running_loop().call_soon(self.power_cycle)
+        return True
+
+    def read(self, command: str, record: Record, channel: int, start: int, count: int) -> Counts:
+        """Samples of a record as a reply to ``command`` holds them."""
+        if record.channels > 1 and self.faults.strikes("swapped_channels", command) is not None:
+            channel = (channel + 1) % record.channels
+        counts = record.samples[channel, start : start + count]
+        return counts.byteswap() if self.faults.strikes("swapped_bytes", command) is not None else counts
+
+    def span_crc(self, command: str, record: Record, channel: int, start: int, count: int) -> int:
+        """CRC-32 of a span as a reply to ``command`` states it."""
+        crc = record.crc(channel, start, count)
+        return crc ^ 0xFFFFFFFF if self.faults.strikes("bad_crc32", command) is not None else crc
 
     def reset(self) -> None:
         """``*RST``."""

@@ -42,6 +42,13 @@ class Flight:
         v = 0.0 if self.v < 0 else self.v
         return x + v * after + 0.5 * self.down * after**2
 
+    def path(self, t: Floats) -> Floats:
+        """``position`` at many times (n,)."""
+        rise = np.minimum(t, self.apex)
+        after = t - rise
+        x = self.x + self.v * rise + 0.5 * self.up * rise**2
+        return x + max(self.v, 0.0) * after + 0.5 * self.down * after**2
+
     def speed(self, t: float) -> float:
         """Speed in m/s, ``t`` s after ``start``."""
         if t < self.apex:
@@ -162,6 +169,21 @@ class Motion:
             F[first:last] = contact.force(t[first:last] - start)
         F[(t >= self.rest_from) & (t < self.over)] = self.law.m * g
         return F
+
+    def position(self, t: Floats) -> Floats:
+        """The dart's displacement in m at the times ``t`` (n,), rising, s from first contact."""
+        if not len(t):
+            return np.zeros(0)
+        self.extend(float(t[-1]))
+        x = np.full_like(t, self.flights[0].x)
+        for k, flight in enumerate(self.flights):
+            first = np.searchsorted(t, flight.start)
+            x[first:] = flight.path(np.minimum(t[first:], self.over) - flight.start)
+            if k < len(self.contacts):
+                start, contact = self.contacts[k]
+                first = np.searchsorted(t, start)
+                x[first:] = contact.position(t[first:] - start)
+        return x
 
     def ringings(self, until: float) -> Iterator[tuple[float, float]]:
         """Moments (s) that set the sensor ringing before ``until``, each with the force in N it is measured by."""

@@ -146,6 +146,14 @@ class Contact:
                 F[inside] = _force(self.law, piece, t[inside])
         return F
 
+    def position(self, t: Floats) -> Floats:
+        """The dart's displacement in m at the times ``t`` (n,); that of the end after it."""
+        x = np.full_like(t, self.x_end)
+        for piece in self.pieces:
+            inside = (t >= piece.start) & (t < piece.end)
+            x[inside] = piece.solution(t[inside])[0]
+        return x
+
 
 def _force(law: Law, piece: Piece, t: Floats) -> Floats:
     y = piece.solution(t)

@@ -32,7 +32,7 @@ class Record:
     bits: int
     samples: NDArray[np.int16]
     edges_ns: list[int] = field(default_factory=list[int])
-    _crcs: dict[tuple[int, int, int], int] = field(default_factory=dict[tuple[int, int, int], int])
+    crcs: dict[tuple[int, int, int], int] = field(default_factory=dict[tuple[int, int, int], int])
 
     @property
     def points(self) -> int:
@@ -48,11 +48,11 @@ class Record:
         """CRC-32 of samples of channel index ``channel``, as little-endian bytes."""
         end = self.points if count is None else start + count
         span = channel, start, end
-        if span not in self._crcs:
-            if len(self._crcs) >= 64:
-                self._crcs.clear()
-            self._crcs[span] = zlib.crc32(self.samples[channel, start:end].astype("<i2").tobytes())
-        return self._crcs[span]
+        if span not in self.crcs:
+            if len(self.crcs) >= 64:
+                self.crcs.clear()
+            self.crcs[span] = zlib.crc32(self.samples[channel, start:end].astype("<i2").tobytes())
+        return self.crcs[span]
 
 
 class Memory:
@@ -114,7 +114,7 @@ class Memory:
         held: dict[str, Any] | None = None
         body = b""
         if self.held is not None:
-            held = {key: value for key, value in vars(self.held).items() if key not in ("samples", "_crcs")}
+            held = {key: value for key, value in vars(self.held).items() if key not in ("samples", "crcs")}
             held |= {"channels": self.held.channels, "points": self.held.points}
             body = self.held.samples.astype("<i2").tobytes()
         header = {"format": FORMAT, "boot": self.boot, "last_id": self.last_id, "held": held}

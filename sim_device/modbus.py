@@ -6,7 +6,9 @@ import struct
 from collections.abc import Iterator
 
 from sim_device import modbus_registers as registers
+from sim_device.checksum import crc16
 from sim_device.device import Device
+from sim_device.fault import Language
 from sim_device.modbus_registers import Exceptional
 
 UNIT = 1
@@ -15,27 +17,14 @@ MOST_READ, MOST_WRITTEN = 125, 123
 LONGEST_RTU, LONGEST_TCP = 256, 254
 
 
-def crc16(data: bytes) -> bytes:
-    """The check sum of an RTU frame, low byte first (polynomial 0xA001, from 0xFFFF)."""
-    crc = 0xFFFF
-    for byte in data:
-        crc = crc >> 8 ^ TABLE[(crc ^ byte) & 0xFF]
-    return crc.to_bytes(2, "little")
-
-
-def _entry(value: int) -> int:
-    for _ in range(8):
-        value = value >> 1 ^ (0xA001 if value & 1 else 0)
-    return value
-
-
-TABLE = [_entry(value) for value in range(256)]
-
-
-def answer(device: Device, request: bytes) -> tuple[str, bytes]:
-    """The reply to a request (both function code and data), with the name of its command, "FC04"."""
+def answer(device: Device, request: bytes) -> tuple[str, bytes | None]:
+    """The reply to a request (both function code and data), with the name of its command, "FC04"; None: no reply."""
     function = request[0]
     name = f"FC{function:02d}"
+    if device.struck(name):
+        return name, None
+    if device.faults.strikes("busy", name) is not None:
+        return name, bytes([function | 0x80, registers.BUSY])
     if (fault := device.faults.strikes("exception", name)) is not None:
         return name, bytes([function | 0x80, int(fault.options["code"])])
     try:
@@ -69,6 +58,8 @@ def _reply(device: Device, function: int, request: bytes) -> bytes:
 
 class RtuSession:
     """One serial line. Frames end by the length their function implies; silence throws away what is unfinished."""
+
+    language: Language = "rtu"
 
     def __init__(self, device: Device) -> None:
         """Serve ``device``."""
@@ -107,12 +98,15 @@ class RtuSession:
     def _frame(self, frame: bytes) -> Iterator[tuple[str, bytes]]:
         if frame[0] == UNIT:
             name, reply = answer(self._device, frame[1:-2])
-            body = frame[:1] + reply
-            yield name, body + crc16(body)
+            if reply is not None:
+                body = frame[:1] + reply
+                yield name, body + crc16(body)
 
 
 class TcpSession:
     """One TCP connection; requests are answered in the order in which they came."""
+
+    language: Language = "tcp"
 
     def __init__(self, device: Device) -> None:
         """Serve ``device``."""
@@ -134,4 +128,5 @@ class TcpSession:
             del self._pending[: 6 + length]
             if unit == UNIT:
                 name, reply = answer(self._device, request)
-                yield name, struct.pack(">HHHB", transaction, 0, len(reply) + 1, unit) + reply
+                if reply is not None:
+                    yield name, struct.pack(">HHHB", transaction, 0, len(reply) + 1, unit) + reply

@@ -8,8 +8,9 @@ from dataclasses import replace
 from sim_device.device import IDENTITY, Device, Reading
 from sim_device.errors import DeviceError
 
-ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE, REFUSED = 1, 2, 3, 4
+ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE, REFUSED, BUSY = 1, 2, 3, 4, 6
 LAST_INPUT, FIRST_SAMPLE, LAST_HOLDING = 175, 0x1000, 47
+SPAN_CRC = 168
 AT_ONCE = 16
 
 SOURCES, SLOPES = ("INT", "IMM", "EXT"), ("POS", "NEG")
@@ -31,7 +32,7 @@ class Exceptional(Exception):
 def input_registers(device: Device, address: int, count: int) -> bytes:
     """Registers ``address`` to ``address + count`` as big-endian bytes."""
     if address + count <= LAST_INPUT + 1:
-        return _block(device)[2 * address : 2 * (address + count)]
+        return _block(device, address <= SPAN_CRC < address + count)[2 * address : 2 * (address + count)]
     if address < FIRST_SAMPLE or address + count > 0x10000:
         raise Exceptional(ILLEGAL_ADDRESS)
     record, reading = device.memory.held, device.reading
@@ -43,10 +44,10 @@ def input_registers(device: Device, address: int, count: int) -> bytes:
         or start + count > record.points
     ):
         raise Exceptional(ILLEGAL_ADDRESS)
-    return record.samples[reading.window_channel - 1, start : start + count].astype(">i2").tobytes()
+    return device.read("FC04", record, reading.window_channel - 1, start, count).astype(">i2").tobytes()
 
 
-def _block(device: Device) -> bytes:
+def _block(device: Device, with_crc: bool) -> bytes:
     image = bytearray(2 * (LAST_INPUT + 1))
 
     def put(address: int, form: str, *values: int) -> None:
@@ -64,8 +65,9 @@ def _block(device: Device) -> bytes:
         put(96, "IIIIIqQHH4I", record.id, record.boot, record.hash, record.points, record.interval_ns, record.first_ns,
             record.trigger_us, record.bits, record.channels, *crcs)  # fmt: skip
         r = device.reading
-        if r.span_channel <= record.channels and r.span_count and r.span_start + r.span_count <= record.points:
-            put(168, "I", record.crc(r.span_channel - 1, r.span_start, r.span_count))
+        within = r.span_channel <= record.channels and r.span_count and r.span_start + r.span_count <= record.points
+        if with_crc and within:
+            put(SPAN_CRC, "I", device.span_crc("FC04", record, r.span_channel - 1, r.span_start, r.span_count))
     gate_id, edges = device.recorder.gate()
     put(128, "IH", gate_id, len(edges))
     put(132, "8q", *edges, *[0] * (8 - len(edges)))

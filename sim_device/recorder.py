@@ -5,19 +5,22 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
+
+import numpy as np
 
 from sim_device import stream
 from sim_device.acquisition import Acquisition, Setup, State
 from sim_device.errors import DeviceError
 from sim_device.faults import Faults
+from sim_device.flaws import flawed
 from sim_device.gate import MOST_EDGES
 from sim_device.memory import Memory, Record
 from sim_device.settings import Rig
-from sim_device.stream import Drop
+from sim_device.stream import Counts, Drop
+from sim_device.trigger import Trigger, until
 
-LOOK_AHEAD_NS = 250_000_000
-"""How far ahead the comparator looks at noise alone, when its level lies within it."""
 EDGES_BELONG = 5e9
 """ns after the trigger for which gate edges still belong to its record."""
 
@@ -26,24 +29,32 @@ class Recorder:
     """States and acquisition; times of day are the monotonic clock's, in ns."""
 
     def __init__(
-        self, memory: Memory, faults: Faults, rig: Callable[[], Rig], seed: int, log: Callable[[str], None]
+        self,
+        memory: Memory,
+        faults: Faults,
+        rig: Callable[[], Rig],
+        seed: int,
+        log: Callable[[str], None],
+        power_cycle: Callable[[], None],
     ) -> None:
         """After power on: holding what the memory holds."""
         self.memory, self.faults, self._rig, self._seed, self._log = memory, faults, rig, seed, log
+        self._power_cycle = power_cycle
+        self.trigger = Trigger(faults, rig, seed, log)
         self.setup = Setup()
         self.state = State.HELD if memory.held else State.IDLE
         self.started = time.monotonic_ns()
         self.acquisition: Acquisition | None = None
-        self.drop: Drop | None = None
         self._task: asyncio.Task[None] | None = None
-        self._released = asyncio.Event()
-        self._contact_input = asyncio.Event()
 
     def configure(self, **changes: Any) -> None:
         """Change settings, all or none."""
         if self.state not in (State.IDLE, State.HELD):
             raise DeviceError(-221)
-        self.setup = self.setup.changed(**changes)
+        setup = self.setup.changed(**changes)
+        if "interval_ns" in changes and self.faults.strikes("clamped_settings") is not None:
+            setup = replace(setup, interval_ns=1000 if setup.interval_ns == 2000 else 2000)
+        self.setup = setup
 
     def init(self) -> None:
         """Idle → filling."""
@@ -51,10 +62,10 @@ class Recorder:
             raise DeviceError(-213)
         record_id = self.memory.new_id()
         run = Acquisition(record_id, self.setup, float(time.monotonic_ns()))
-        if self.drop is not None and self.drop.moving():
-            run.origin = self.drop.on_grid(run.origin, self.setup.interval_ns)
+        drop = self.trigger.drop
+        if drop is not None and drop.moving():
+            run.origin = drop.on_grid(run.origin, self.setup.interval_ns)
         self.acquisition, self.state = run, State.FILLING
-        self._contact_input.clear()
         self._task = asyncio.get_running_loop().create_task(self._acquire(run))
         self._task.add_done_callback(self._ended)
         self._log(f"record {record_id}: filling")
@@ -99,18 +110,27 @@ class Recorder:
         self.state = State.IDLE
         self._log(f"record {record_id}: acknowledged")
 
+    def overwrite(self) -> None:
+        """A fault: what is held is overwritten by a record of nothing."""
+        held = self.memory.held
+        if held is None:
+            return
+        record_id = self.memory.new_id()
+        samples = self._quiet(record_id, 0, held.interval_ns, held.points)
+        self.memory.hold(replace(held, id=record_id, samples=samples, edges_ns=[], crcs={}))
+        self._log(f"record {held.id}: overwritten by {record_id}")
+
     def released(self, drop: Drop) -> None:
         """The dart has been let go: an acquisition under way will see the drop."""
         if self.acquisition is not None and self.state in (State.FILLING, State.ARMED, State.MEASURING):
             drop.snap(self.acquisition.origin, self.acquisition.setup.interval_ns)
-        self.drop = drop
-        self._released.set()
+        self.trigger.released(drop)
 
     def edge(self, at: float, free: bool) -> None:
         """A gate edge at ``at`` ns."""
         run = self.acquisition
         if not free:
-            self._contact_input.set()
+            self.trigger.beam_broken()
         if run is None or len(run.edges) >= MOST_EDGES:
             return
         if run.trigger is None or at - run.trigger < EDGES_BELONG:
@@ -133,95 +153,65 @@ class Recorder:
         clock = self._rig().gate.clock_ns
         return [round((edge - (run.trigger or 0.0)) / clock) * clock for edge in run.edges]
 
-    async def _until(self, at: float) -> None:
-        await asyncio.sleep(max(0.0, (at - time.monotonic_ns()) / 1e9))
-
     async def _acquire(self, run: Acquisition) -> None:
         setup = run.setup
-        await self._until(run.origin + setup.pretrigger * setup.interval_ns)
+        await until(run.origin + setup.pretrigger * setup.interval_ns)
         self.state = State.ARMED
-        self._contact_input.clear()
         self._log(f"record {run.id}: armed")
-        await {"INT": self._level_trigger, "IMM": self._no_trigger, "EXT": self._contact_trigger}[setup.source](run)
+        await self.trigger.wait(run)
         self.state = State.MEASURING
-        trigger = run.trigger or 0.0
         self._log(f"record {run.id}: triggered")
-        await self._until(trigger + setup.first_ns + setup.points * setup.interval_ns)
-        if run.drop is None and self.drop is not None and self.drop.moving_at(trigger + setup.first_ns):
-            run.drop, run.trigger_after_contact = self.drop, trigger - self.drop.contact
+        await self._measure(run)
         counts = await asyncio.to_thread(self._take, run)
-        if (fault := self.faults.strikes("stuck_bit")) is not None:
-            counts = stream.with_stuck_bit(counts, int(fault.options["bit"]), bool(fault.options["at"]))
-        record = Record(
-            id=run.id, boot=self.memory.boot, hash=setup.hash, interval_ns=setup.interval_ns, first_ns=setup.first_ns,
-            trigger_us=int((trigger - self.started) // 1000), bits=self._rig().sensor.bits,
-            samples=counts.reshape(1, -1), edges_ns=self._edges(run),
-        )  # fmt: skip
-        self.memory.hold(record)
+        self.memory.hold(self._record(run, flawed(counts, self._rig().sensor.bits, self.faults)))
         self.state, self._task = State.HELD, None
         self._log(f"record {run.id}: held")
 
-    def _take(self, run: Acquisition) -> Any:
-        setup = run.setup
-        if run.drop is not None:
-            return run.drop.counts(run.trigger_after_contact + setup.first_ns, setup.interval_ns, setup.points)
-        first = run.trigger_index + setup.first_ns // setup.interval_ns
-        return stream.quiet(self._rig().sensor, (self._seed, 1, run.id), first, setup.points)
-
-    def _fired(self, run: Acquisition, at: float) -> bool:
-        if self.faults.strikes("missing_trigger") is not None:
-            self._log(f"record {run.id}: fault missing_trigger")
-            return False
-        run.trigger = at
-        return True
-
-    async def _no_trigger(self, run: Acquisition) -> None:
-        run.trigger_index = run.setup.pretrigger
-        if not self._fired(run, run.origin + run.setup.pretrigger * run.setup.interval_ns):
+    async def _measure(self, run: Acquisition) -> None:
+        """Until the last sample of the record."""
+        setup, trigger = run.setup, run.trigger or 0.0
+        if (fault := self.faults.strikes("double_trigger")) is not None:
+            later = fault.options["seconds"] * 1e9
+            run.trigger = trigger = trigger + later
+            run.trigger_after_contact += later
+            run.trigger_index += round(later / setup.interval_ns)
+        if (fault := self.faults.strikes("short_pretrigger")) is not None:
+            run.missing = min(int(fault.options["missing"]), setup.pretrigger)
+        if (fault := self.faults.strikes("wrong_clock")) is not None:
+            run.clock = fault.options["factor"]
+        end = trigger + setup.first_ns + setup.points * setup.interval_ns
+        if self.faults.strikes("brown_out") is not None:
+            await until((trigger + end) / 2)
+            asyncio.get_running_loop().call_soon(self._power_cycle)
             await asyncio.Event().wait()
+        await until(end)
+        drop = self.trigger.drop
+        if run.drop is None and drop is not None and drop.moving_at(trigger + setup.first_ns):
+            run.drop, run.trigger_after_contact = drop, trigger - drop.contact
 
-    async def _contact_trigger(self, run: Acquisition) -> None:
-        while True:
-            await self._contact_input.wait()
-            self._contact_input.clear()
-            if self._fired(run, run.edges[-1] if run.edges else float(time.monotonic_ns())):
-                return
+    def _record(self, run: Acquisition, counts: Counts) -> Record:
+        setup, trigger = run.setup, run.trigger or 0.0
+        record = Record(
+            id=run.id, boot=self.memory.boot, hash=setup.hash, interval_ns=setup.interval_ns, first_ns=run.first_ns,
+            trigger_us=int((trigger - self.started) // 1000), bits=self._rig().sensor.bits,
+            samples=counts, edges_ns=self._edges(run),
+        )  # fmt: skip
+        if self.faults.strikes("stale_record") is None:
+            return record
+        before = self._quiet(run.id - 1, 0, setup.interval_ns, setup.points)
+        return replace(record, id=run.id - 1, samples=before, edges_ns=[])
 
-    async def _level_trigger(self, run: Acquisition) -> None:
-        setup, h, last_drop = run.setup, run.setup.interval_ns, 0
-        index = setup.pretrigger
-        while True:
-            self._released.clear()
-            drop, sensor = self.drop, self._rig().sensor
-            if drop is not None and drop.moving() and drop.number != last_drop:
-                last_drop = drop.number
-                from_index = max(index, run.index_at(drop.release)) - drop.index(run.origin, h)
-                found = await asyncio.to_thread(drop.crossing, setup, from_index)
-                if found is not None:
-                    after = drop.since_contact(found, h)
-                    await self._until(drop.contact + after)
-                    if self._fired(run, drop.contact + after):
-                        run.drop, run.trigger_after_contact = drop, after
-                        return
-                await self._until(drop.contact + drop.motion.over * 1e9)
-                index = run.index_at(time.monotonic_ns())
-            elif stream.within_noise(sensor, setup.level):
-                length = LOOK_AHEAD_NS // h
-                key = (self._seed, 1, run.id)
-                found = await asyncio.to_thread(stream.quiet_crossing, sensor, key, setup, index, length)
-                index = index + length if found is None else found
-                if not await self._release_before(run.origin + index * h) and found is not None:
-                    run.trigger_index = found
-                    if self._fired(run, run.origin + found * h):
-                        return
-                    index = found + 1
-            else:
-                await self._released.wait()
+    def _take(self, run: Acquisition) -> Counts:
+        setup = run.setup
+        if run.drop is None:
+            return self._quiet(
+                run.id, run.trigger_index + run.first_ns // setup.interval_ns, setup.interval_ns, setup.points
+            )
+        first, interval = run.trigger_after_contact + run.first_ns * run.clock, setup.interval_ns * run.clock
+        channels = range(self._rig().recorder.channels)
+        return np.stack([run.drop.counts(first, interval, setup.points, channel) for channel in channels])
 
-    async def _release_before(self, at: float) -> bool:
-        """Wait until ``at`` (ns) or a release, whichever is first, and say whether it was the release."""
-        try:
-            await asyncio.wait_for(self._released.wait(), max(0.0, (at - time.monotonic_ns()) / 1e9))
-        except TimeoutError:
-            return False
-        return True
+    def _quiet(self, record_id: int, first: int, interval_ns: int, points: int) -> Counts:
+        rig = self._rig()
+        key = (self._seed, 1, record_id)
+        return np.stack([stream.quiet(rig, key, first, points, channel) for channel in range(rig.recorder.channels)])

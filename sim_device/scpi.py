@@ -9,6 +9,7 @@ from decimal import Decimal, InvalidOperation
 
 from sim_device.device import Device
 from sim_device.errors import DeviceError
+from sim_device.fault import Language
 
 LONGEST_LINE = 1 << 16
 HEADER = re.compile(r"[*:]?[A-Za-z][A-Za-z0-9_]*(?::[A-Za-z][A-Za-z0-9_]*)*\??")
@@ -61,6 +62,8 @@ class Interface:
 
 class Session:
     """One client's line: keeps what has arrived of an unfinished command."""
+
+    language: Language = "scpi"
 
     def __init__(self, device: Device, interface: Interface) -> None:
         """Serve ``device``."""
@@ -133,7 +136,7 @@ class Session:
                 raise DeviceError(-102)
             if len(parameters) != command.parameters:
                 raise DeviceError(-109 if len(parameters) < command.parameters else -108)
-            return command.answer(self._device, parameters)
+            return None if self._device.struck(command.name) else command.answer(self._device, parameters)
         except DeviceError as error:
             self._device.status.report(error.code)
             return block(b"") if command.data else None

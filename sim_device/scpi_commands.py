@@ -6,7 +6,7 @@ from collections.abc import Callable
 from decimal import Decimal
 
 from sim_device.acquisition import State
-from sim_device.device import CHANNELS, IDENTITY, Device
+from sim_device.device import IDENTITY, Device
 from sim_device.errors import OPERATION_COMPLETE, DeviceError
 from sim_device.memory import Record
 from sim_device.scpi import Command, Interface, block, decimal, integer, word
@@ -85,23 +85,23 @@ def _span(device: Device, parameters: list[str]) -> tuple[Record, int, int, int]
     return record, index, start, count
 
 
-def _samples(device: Device, record: Record, channel: int, start: int, count: int) -> bytes:
+def _samples(device: Device, name: str, record: Record, channel: int, start: int, count: int) -> bytes:
     order = "<i2" if device.reading.swapped else ">i2"
-    return block(record.samples[channel, start : start + count].astype(order).tobytes())
+    return block(device.read(name, record, channel, start, count).astype(order).tobytes())
 
 
 def _data(device: Device, parameters: list[str]) -> bytes:
-    return _samples(device, *_span(device, parameters))
+    return _samples(device, "TRAC:DATA?", *_span(device, parameters))
 
 
 def _crc(device: Device, parameters: list[str]) -> bytes:
-    record, channel, start, count = _span(device, parameters)
-    return str(record.crc(channel, start, count)).encode()
+    crc = device.span_crc("TRAC:CRC?", *_span(device, parameters))
+    return str(crc).encode()
 
 
 def _fetch(device: Device, parameters: list[str]) -> bytes:
     record = held(device)
-    return _samples(device, record, 0, 0, record.points)
+    return _samples(device, "FETC?", record, 0, 0, record.points)
 
 
 def _header(device: Device) -> str:
@@ -167,7 +167,11 @@ COMMANDS = [
     Command("FORMat:BORDer?", 0, _says(lambda d: "SWAP" if d.reading.swapped else "NORM")),
     Command("FORMat:SENTinel?", 0, lambda d, p: block(b"\x02\x01" if d.reading.swapped else b"\x01\x02"), data=True),
     Command("TRACe:STATus?", 0, _says(_trace_status)),
-    Command("TRACe:CATalog?", 0, _says(lambda d: '"' + ",".join(f"CH{n + 1}" for n in range(CHANNELS)) + '"')),
+    Command(
+        "TRACe:CATalog?",
+        0,
+        _says(lambda d: '"' + ",".join(f"CH{n + 1}" for n in range(d.tower.rig.recorder.channels)) + '"'),
+    ),
     Command("TRACe:HEADer?", 0, _says(_header)),
     Command("TRACe:DATA?", 3, _data, data=True),
     Command("TRACe:CRC?", 3, _crc),

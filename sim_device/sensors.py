@@ -1,30 +1,60 @@
-"""From the contact force to the counts of the converter."""
+"""From the dart's motion to the counts of the converter, channel by channel."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim_device.fall import Motion
 from sim_device.mechanics import Floats
-from sim_device.settings import Dart, Sensor
+from sim_device.settings import Dart, Rig, Sensor, g
 
+DISPLACEMENT, ACCELEROMETER = 2, 3
+"""Channels, from 0; 0 and 1 are the tups."""
 NOISE_BLOCK = 4096
 RINGING_LASTS = 40
 """Decay times after which a ringing is below any converter's step."""
 DROOP_BLOCK = 4096
 
 
-def counts_per_newton(sensor: Sensor) -> float:
-    """Counts a newton: the rails stand at ±range_N."""
-    return 2 ** (sensor.bits - 1) / sensor.range_N
+@dataclass(frozen=True)
+class Scale:
+    """A channel's converter: ``range`` at the rails, ``noise`` and ``offset`` in the channel's unit."""
+
+    range: float
+    noise: float
+    offset: float
+    bits: int
+
+    @classmethod
+    def of(cls, rig: Rig, channel: int) -> Scale:
+        """The converter of a channel, from 0."""
+        bits = rig.sensor.bits
+        if channel == DISPLACEMENT:
+            d = rig.displacement
+            return cls(d.range_mm, d.noise_mm, d.offset_mm, bits)
+        if channel == ACCELEROMETER:
+            a = rig.accelerometer
+            return cls(a.range_m_s2, a.noise_m_s2, a.offset_m_s2, bits)
+        s = _tup(rig, channel)
+        return cls(s.range_N, s.noise_N, s.offset_N, bits)
+
+    @property
+    def per_unit(self) -> float:
+        """Counts a unit: the rails stand at ±range."""
+        return 2 ** (self.bits - 1) / self.range
+
+    def counts(self, value: Floats) -> NDArray[np.int16]:
+        """Counts of the converter (n,) for a value in the channel's unit (n,), clipped at the rails."""
+        rail = 2 ** (self.bits - 1)
+        return np.clip(np.rint(value * self.per_unit), -rail, rail - 1).astype(np.int16)
 
 
-def rails(sensor: Sensor) -> tuple[int, int]:
-    """Smallest and largest count of the converter."""
-    return -(2 ** (sensor.bits - 1)), 2 ** (sensor.bits - 1) - 1
+def _tup(rig: Rig, channel: int) -> Sensor:
+    return rig.second_sensor if channel else rig.sensor
 
 
 def white(seed: tuple[int, ...], first: int, n: int) -> Floats:
@@ -70,24 +100,29 @@ def _force_chain(motion: Motion, dart: Dart, sensor: Sensor, t: Floats) -> Float
     return F
 
 
-def signal(motion: Motion | None, dart: Dart, sensor: Sensor, first: float, interval: float, n: int) -> Floats:
-    """What the sensor chain puts before the converter, without noise, in N (n,).
+def at_rest(rig: Rig, channel: int) -> float:
+    """What a channel sees while the dart hangs in its clamp, in its unit, without offset."""
+    if channel == DISPLACEMENT:
+        height = rig.drop.height_mm if rig.drop.height_mm is not None else 500 * (rig.drop.v0 or 0) ** 2 / g
+        return -height * rig.displacement.gain
+    return g * rig.accelerometer.gain if channel == ACCELEROMETER else 0.0
+
+
+def signal(rig: Rig, motion: Motion, channel: int, first: float, interval: float, n: int) -> Floats:
+    """What a channel's sensor puts before the converter, without offset and noise, in the channel's unit (n,).
 
     ``first`` is the time of the first sample in s from first contact, ``interval`` the time between samples in s.
     """
-    if motion is None:
-        return np.full(n, sensor.offset_N)
     t = np.add(first, np.arange(n) * interval, dtype=np.float64)
+    if channel == DISPLACEMENT:
+        return motion.position(t) * 1e3 * rig.displacement.gain
+    if channel == ACCELEROMETER:
+        return np.where(t < -motion.t_fall, g, motion.force(t) / motion.law.m) * rig.accelerometer.gain
+    sensor = _tup(rig, channel)
     if sensor.time_constant_s is None:
-        return _force_chain(motion, dart, sensor, t) + sensor.offset_N
+        return _force_chain(motion, rig.dart, sensor, t)
     # The amplifier remembers all that was before: its samples begin before first contact.
     earlier = max(0, math.ceil(first / interval) + 1)
     whole = np.add(first - earlier * interval, np.arange(n + earlier) * interval, dtype=np.float64)
-    F = _force_chain(motion, dart, sensor, whole)
-    return droop(F, interval, sensor.time_constant_s)[earlier:] + sensor.offset_N
-
-
-def digitised(force: Floats, sensor: Sensor) -> NDArray[np.int16]:
-    """Counts of the converter (n,) for a force in N (n,), clipped at the rails."""
-    low, high = rails(sensor)
-    return np.clip(np.rint(force * counts_per_newton(sensor)), low, high).astype(np.int16)
+    F = _force_chain(motion, rig.dart, sensor, whole)
+    return droop(F, interval, sensor.time_constant_s)[earlier:]

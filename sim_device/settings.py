@@ -78,6 +78,33 @@ class Sensor:
 
 
 @dataclass(frozen=True)
+class Displacement:
+    """Displacement sensor on channel 3: the tip's way from the undeformed specimen, positive into it."""
+
+    noise_mm: float = number(0, 1e3, 0.005)
+    offset_mm: float = number(-1e3, 1e3, 0)
+    gain: float = number(-10, 10, 1)
+    range_mm: float = number(0.01, 1e4, 20)
+
+
+@dataclass(frozen=True)
+class Accelerometer:
+    """Accelerometer on channel 4, fast to the dart, positive up: g in the clamp, 0 in free fall, F/m in contact."""
+
+    noise_m_s2: float = number(0, 1e6, 5)
+    offset_m_s2: float = number(-1e6, 1e6, 0)
+    gain: float = number(-10, 10, 1)
+    range_m_s2: float = number(1, 1e7, 10_000)
+
+
+@dataclass(frozen=True)
+class Recorder:
+    """Channels that are recorded: tup, second tup, displacement, accelerometer, in this order."""
+
+    channels: int = number(1, 4, 1, whole=True)
+
+
+@dataclass(frozen=True)
 class Gate:
     """Flag and beam; the flag's middle passes the beam when the tip is ``gap_mm`` above contact."""
 
@@ -115,11 +142,15 @@ class Rig:
     specimen: Specimen = field(default_factory=Specimen)
     dart: Dart = field(default_factory=Dart)
     sensor: Sensor = field(default_factory=Sensor)
+    second_sensor: Sensor = field(default_factory=lambda: Sensor(noise_N=6, offset_N=-3, gain=0.98))
+    displacement: Displacement = field(default_factory=Displacement)
+    accelerometer: Accelerometer = field(default_factory=Accelerometer)
+    recorder: Recorder = field(default_factory=Recorder)
     gate: Gate = field(default_factory=Gate)
     drop: Hang = field(default_factory=Hang)
 
 
-Part = TypeVar("Part", Specimen, Dart, Sensor, Gate, Hang)
+Part = TypeVar("Part", Specimen, Dart, Sensor, Displacement, Accelerometer, Recorder, Gate, Hang)
 
 
 def _value(key: str, value: object, default: object, limits: dict[str, Any]) -> object:
@@ -162,13 +193,13 @@ def changed(part: Part, changes: dict[str, Any]) -> Part:
         elif values.get("v0") is not None:
             values.setdefault("height_mm", None)
     result = replace(part, **values)
-    if not isinstance(result, Specimen | Sensor):
+    if isinstance(result, Dart | Gate | Hang):
         result.check()
     return result
 
 
-def load_scenario(path: Path) -> Rig:
-    """The rig of a scenario file (TOML): tables specimen, dart, sensor, gate, drop with the control endpoint's keys.
+def load_scenario(path: Path) -> tuple[Rig, list[dict[str, Any]]]:
+    """The rig of a scenario file (TOML: the control endpoint's names and keys) and its ``[[fault]]`` tables.
 
     Raises
     ------
@@ -179,14 +210,17 @@ def load_scenario(path: Path) -> Rig:
         tables = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise SettingError(f"scenario {path}: {error}") from error
+    faults: Any = tables.pop("fault", [])
+    if not isinstance(faults, list) or not all(isinstance(table, dict) for table in faults):  # pyright: ignore[reportUnknownVariableType]  whatever TOML holds
+        raise SettingError(f"scenario {path}: a fault is a table [[fault]]")
     rig = Rig()
     for name, table in tables.items():
         try:
             if name not in (names := [entry.name for entry in fields(rig)]):
-                raise SettingError(nearest(name, names))
+                raise SettingError(nearest(name, [*names, "fault"]))
             if not isinstance(table, dict):
                 raise SettingError(f"{name} must be a table")
             rig = replace(rig, **{name: changed(getattr(rig, name), table)})
         except SettingError as error:
             raise SettingError(f"scenario {path}: [{name}] {error}") from error
-    return rig
+    return rig, faults

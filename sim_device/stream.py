@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sim_device import sensors
 from sim_device.fall import Motion
-from sim_device.settings import Rig, Sensor
+from sim_device.settings import Rig
 
 Counts = NDArray[np.int16]
 
@@ -29,15 +29,17 @@ class Comparator(Protocol):
     def interval_ns(self) -> int: ...
 
 
-def quiet(sensor: Sensor, key: tuple[int, ...], first: int, n: int) -> Counts:
-    """Counts ``first`` to ``first + n`` of the stream while nothing falls: offset and noise (n,)."""
-    return sensors.digitised(sensor.offset_N + sensor.noise_N * sensors.white(key, first, n), sensor)
+def quiet(rig: Rig, key: tuple[int, ...], first: int, n: int, channel: int = 0) -> Counts:
+    """Counts ``first`` to ``first + n`` of a channel while nothing falls: resting value, offset and noise (n,)."""
+    scale = sensors.Scale.of(rig, channel)
+    noise = sensors.white((*key, channel) if channel else key, first, n)
+    return scale.counts(sensors.at_rest(rig, channel) + scale.offset + scale.noise * noise)
 
 
-def within_noise(sensor: Sensor, level: int) -> bool:
+def within_noise(rig: Rig, level: int) -> bool:
     """Whether noise alone can reach the level (six standard deviations and a half count)."""
-    scale = sensors.counts_per_newton(sensor)
-    return abs(level - sensor.offset_N * scale) <= 6 * sensor.noise_N * scale + 0.5
+    scale = sensors.Scale.of(rig, 0)
+    return abs(level - scale.offset * scale.per_unit) <= 6 * scale.noise * scale.per_unit + 0.5
 
 
 def first_crossing(counts: Counts, comparator: Comparator) -> int | None:
@@ -45,13 +47,6 @@ def first_crossing(counts: Counts, comparator: Comparator) -> int | None:
     above = counts >= comparator.level if comparator.slope == "POS" else counts <= comparator.level
     crossing = np.flatnonzero(above[1:] & ~above[:-1])
     return int(crossing[0]) + 1 if len(crossing) else None
-
-
-def with_stuck_bit(counts: Counts, bit: int, at: bool) -> Counts:
-    """Counts (n,) with one bit of each stuck at 0 or 1."""
-    words = counts.view(np.uint16)
-    mask = np.uint16(1 << bit)
-    return (words | mask if at else words & ~mask).view(np.int16)
 
 
 class Drop:
@@ -92,17 +87,18 @@ class Drop:
         """Whether the dart moves now."""
         return self.moving_at(time.monotonic_ns())
 
-    def counts(self, first_ns: float, interval_ns: int, n: int) -> Counts:
-        """Counts (n,) from ``first_ns`` after first contact on."""
-        sensor = self.rig.sensor
-        force = sensors.signal(self.motion, self.rig.dart, sensor, first_ns * 1e-9, interval_ns * 1e-9, n)
-        noise = sensors.white(self._key, round(first_ns / interval_ns + self.phase), n)
-        return sensors.digitised(force + sensor.noise_N * noise, sensor)
+    def counts(self, first_ns: float, interval_ns: float, n: int, channel: int = 0) -> Counts:
+        """Counts (n,) of a channel from ``first_ns`` after first contact on."""
+        scale = sensors.Scale.of(self.rig, channel)
+        value = sensors.signal(self.rig, self.motion, channel, first_ns * 1e-9, interval_ns * 1e-9, n)
+        key = (*self._key, channel) if channel else self._key
+        noise = sensors.white(key, round(first_ns / interval_ns + self.phase), n)
+        return scale.counts(value + scale.offset + scale.noise * noise)
 
     def crossing(self, comparator: Comparator, index: int) -> int | None:
         """The first sample from ``index`` on that fires the comparator while the dart moves, None if none does."""
         h = comparator.interval_ns
-        if not within_noise(self.rig.sensor, comparator.level):
+        if not within_noise(self.rig, comparator.level):
             index = max(index, -1)
         length = FIRST_CHUNK
         while self.since_contact(index, h) * 1e-9 < self.motion.over:
@@ -113,7 +109,7 @@ class Drop:
         return None
 
 
-def quiet_crossing(sensor: Sensor, key: tuple[int, ...], comparator: Comparator, index: int, n: int) -> int | None:
+def quiet_crossing(rig: Rig, key: tuple[int, ...], comparator: Comparator, index: int, n: int) -> int | None:
     """The first sample of ``index`` to ``index + n`` at which noise alone fires the comparator."""
-    found = first_crossing(quiet(sensor, key, index - 1, n + 1), comparator)
+    found = first_crossing(quiet(rig, key, index - 1, n + 1), comparator)
     return None if found is None else index - 1 + found

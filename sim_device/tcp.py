@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import socket
+import struct
 from collections.abc import Callable
 from typing import cast
 
-from sim_device.faults import Faults, Pause, Pieces
+from sim_device.fault import Cut, Pause, Pieces
+from sim_device.faults import Faults
 from sim_device.modbus import TcpSession
 from sim_device.wires import Session
 
 HOST = "127.0.0.1"
+RESET = struct.pack("ii", 1, 0)
+"""SO_LINGER that makes a close a reset."""
 
 
 class Link(asyncio.Protocol):
     """One client's connection, with a session of its own."""
 
-    def __init__(self, session: Session, faults: Faults, links: set[Link]) -> None:
-        """Serve ``session``; ``links`` lists those that are open."""
-        self._session, self._faults, self._links = session, faults, links
+    def __init__(self, port: Port) -> None:
+        """A client of ``port``."""
+        self._port, self._session, self._faults = port, port.session(), port.faults
         self._transport: asyncio.Transport | None = None
         self._pieces: Pieces = []
         self._stalled: asyncio.TimerHandle | None = None
@@ -26,11 +32,13 @@ class Link(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """A client has come."""
         self._transport = cast("asyncio.Transport", transport)
-        self._links.add(self)
+        if self._port.taken:
+            self.close()
+        self._port.links.add(self)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """The client has gone, or the link was closed."""
-        self._links.discard(self)
+        self._port.links.discard(self)
         if self._stalled is not None:
             self._stalled.cancel()
 
@@ -46,8 +54,11 @@ class Link(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         """Commands."""
-        for name, reply in self._session.feed(self._faults.incoming(data)):
-            self._pieces += self._faults.outgoing(name, reply)
+        arrived = self._faults.incoming(data)
+        if echo := self._faults.echo(data):
+            self._pieces.append(echo)
+        for name, reply in self._session.feed(arrived):
+            self._pieces += self._faults.outgoing(name, reply, self._session.language)
         if self._stalled is None:
             self._send()
         if isinstance(self._session, TcpSession) and self._session.broken:
@@ -56,14 +67,35 @@ class Link(asyncio.Protocol):
     def _send(self) -> None:
         self._stalled = None
         run: list[bytes] = []
-        while self._pieces:
+        cut: Cut | None = None
+        while self._pieces and cut is None:
             piece = self._pieces.pop(0)
             if isinstance(piece, Pause):
                 self._stalled = asyncio.get_running_loop().call_later(piece.seconds, self._send)
                 break
-            run.append(piece)
+            if isinstance(piece, Cut):
+                cut = piece
+            else:
+                run.append(piece)
         if self._transport is not None and run:
             self._transport.write(b"".join(run))
+        if cut is not None:
+            self._cut(cut)
+
+    def _cut(self, cut: Cut) -> None:
+        self._pieces.clear()
+        if self._transport is None:
+            return
+        if cut.how == "reset":
+            line = self._transport.get_extra_info("socket")
+            line.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, RESET)
+            self._transport.abort()
+        else:
+            self._transport.close()
+        if cut.how == "vanish":
+            self._port.vanish(cut.seconds)
+        elif cut.how == "taken":
+            self._port.take(cut.seconds)
 
     def close(self) -> None:
         """Close the link; what is under way is lost."""
@@ -71,9 +103,56 @@ class Link(asyncio.Protocol):
             self._transport.abort()
 
 
-async def serve(session: Callable[[], Session], faults: Faults) -> tuple[asyncio.Server, int, set[Link]]:
-    """Open a port of the system's choice; returns the server, the port and the set of open links."""
-    links: set[Link] = set()
-    loop = asyncio.get_running_loop()
-    server = await loop.create_server(lambda: Link(session(), faults, links), HOST, 0)
-    return server, int(server.sockets[0].getsockname()[1]), links
+class Port:
+    """A listening port of the system's choice and the links to it."""
+
+    def __init__(self, session: Callable[[], Session], faults: Faults) -> None:
+        """Each client gets a ``session`` of its own."""
+        self.session, self.faults = session, faults
+        self.links: set[Link] = set()
+        self.number = 0
+        self.taken = False
+        self._server: asyncio.Server | None = None
+        self._opening: asyncio.Task[None] | None = None
+
+    async def open(self) -> None:
+        """Listen; again on the same port once it has one."""
+        loop = asyncio.get_running_loop()
+        self._server = await loop.create_server(lambda: Link(self), HOST, self.number, reuse_address=True)
+        self.number = int(self._server.sockets[0].getsockname()[1])
+
+    def vanish(self, seconds: float) -> None:
+        """Nobody listens for some time."""
+        if self._server is None:
+            return
+        self._server.close()
+        self._server = None
+        self.cut()
+        self._opening = asyncio.get_running_loop().create_task(self._return(seconds))
+
+    async def _return(self, seconds: float) -> None:
+        await asyncio.sleep(seconds)
+        await self.open()
+
+    def take(self, seconds: float) -> None:
+        """Every client is turned away for some time."""
+        self.taken = True
+
+        def free() -> None:
+            self.taken = False
+
+        asyncio.get_running_loop().call_later(seconds, free)
+
+    def cut(self) -> None:
+        """Close every link."""
+        for link in list(self.links):
+            link.close()
+
+    def close(self) -> None:
+        """Listen no more."""
+        if self._opening is not None:
+            self._opening.cancel()
+        if self._server is not None:
+            with contextlib.suppress(OSError):
+                self._server.close()
+        self.cut()

@@ -85,7 +85,9 @@ class Tower:
             if self._faults.strikes("gate_missing") is not None:
                 self._log(f"drop {drop.number}: fault gate_missing")
             elif self.recorder is not None:
-                self.recorder.edge(drop.contact + edge.time * 1e9, edge.free)
+                fault = self._faults.strikes("gate_absurd")
+                off = 0.0 if fault is None else fault.options["seconds"] * 1e9
+                self.recorder.edge(drop.contact + edge.time * 1e9 + off, edge.free)
 
         def hang() -> None:
             self.beam_free = True

@@ -9,8 +9,9 @@ import pytest
 
 from sim_device import sensors
 from sim_device.fall import Motion
-from sim_device.settings import Dart, Hang, Rig, Sensor, Specimen
-from sim_device.stream import Drop, first_crossing, quiet, quiet_crossing, with_stuck_bit, within_noise
+from sim_device.flaws import saturated, with_stuck_bit, without
+from sim_device.settings import Accelerometer, Dart, Displacement, Hang, Rig, Sensor, Specimen
+from sim_device.stream import Drop, first_crossing, quiet, quiet_crossing, within_noise
 
 CLEAN = Sensor(noise_N=0, offset_N=0, ringing=0)
 CAUGHT = Hang(v0=1.39, catcher=True)
@@ -20,6 +21,11 @@ def counts(sensor: Sensor, *, dart: Dart | None = None, specimen: Specimen | Non
     rig = Rig(sensor=sensor, dart=dart or Dart(), specimen=specimen or Specimen(), drop=CAUGHT)
     drop = Drop(number, rig, Motion(rig), 0.0, 0.25, seed)
     return drop, drop.counts(-500_250.0, 1000, n)
+
+
+def chain(sensor: Sensor, drop: Drop, first: float, interval: float, n: int):
+    """The force channel of a drop as another sensor would see it."""
+    return sensors.signal(Rig(sensor=sensor), drop.motion, 0, first, interval, n)
 
 
 def test_counts_are_the_contact_force_in_steps_of_the_range():
@@ -44,7 +50,7 @@ def test_the_sensor_does_not_feel_the_mass_below_it():
 
 def test_noise_and_offset_are_as_set():
     sensor = Sensor(noise_N=3, offset_N=5, bits=16)
-    force = quiet(sensor, (0, 1, 1), 0, 200_000) * (3200 / 2**15)
+    force = quiet(Rig(sensor=sensor), (0, 1, 1), 0, 200_000) * (3200 / 2**15)
     assert force.mean() == pytest.approx(5, abs=0.03)
     assert force.std() == pytest.approx(3, rel=0.01)
     steps = np.diff(force)
@@ -65,8 +71,8 @@ def test_a_seed_gives_the_same_drop_again_and_every_drop_its_own_noise():
 def test_ringing_starts_at_contact_and_decays():
     drop, _ = counts(Sensor(bits=16))
     t = np.linspace(-1e-3, 4e-3, 5001)
-    with_it = sensors.signal(drop.motion, Dart(), Sensor(ringing=0.05), -1e-3, 1e-6, 5001)
-    without = sensors.signal(drop.motion, Dart(), Sensor(ringing=0), -1e-3, 1e-6, 5001)
+    with_it = chain(Sensor(ringing=0.05), drop, -1e-3, 1e-6, 5001)
+    without = chain(Sensor(ringing=0), drop, -1e-3, 1e-6, 5001)
     F_M = drop.motion.contacts[0][1].F_M
     expected = np.where(t < 0, 0, 0.05 * F_M * np.sin(2e4 * np.pi * t) * np.exp(-t / 0.5e-3))
     assert with_it - without == pytest.approx(expected, abs=1e-6)
@@ -87,10 +93,8 @@ def test_droop_is_that_of_a_first_order_high_pass(interval):
 def test_droop_can_be_undone_by_the_integral_of_what_is_measured():
     drop, _ = counts(CLEAN)
     tau, h = 0.1, 1e-6
-    true = sensors.signal(drop.motion, Dart(), CLEAN, -1e-3, h, 8000)
-    seen = sensors.signal(
-        drop.motion, Dart(), Sensor(noise_N=0, offset_N=0, ringing=0, time_constant_s=tau), -1e-3, h, 8000
-    )
+    true = chain(CLEAN, drop, -1e-3, h, 8000)
+    seen = chain(Sensor(noise_N=0, offset_N=0, ringing=0, time_constant_s=tau), drop, -1e-3, h, 8000)
     integral = np.concatenate([[0], np.cumsum(0.5 * h * (seen[1:] + seen[:-1]))])
     assert seen + integral / tau == pytest.approx(true, abs=1e-6)
     assert seen[-1] < -5
@@ -99,8 +103,8 @@ def test_droop_can_be_undone_by_the_integral_of_what_is_measured():
 def test_a_record_that_begins_after_contact_has_the_droop_of_what_came_before():
     drop, _ = counts(CLEAN)
     sensor = Sensor(noise_N=0, offset_N=0, ringing=0, time_constant_s=0.05)
-    whole = sensors.signal(drop.motion, Dart(), sensor, -1e-4, 1e-6, 6000)
-    late = sensors.signal(drop.motion, Dart(), sensor, 1.9e-3, 1e-6, 4000)
+    whole = chain(sensor, drop, -1e-4, 1e-6, 6000)
+    late = chain(sensor, drop, 1.9e-3, 1e-6, 4000)
     assert late == pytest.approx(whole[2000:], abs=1e-3)
 
 
@@ -127,13 +131,45 @@ def test_the_comparator_sees_the_contact_in_the_very_samples_of_the_record():
 
 
 def test_a_level_within_the_noise_is_crossed_by_noise():
-    sensor = Sensor()
-    assert within_noise(sensor, 20)
-    assert not within_noise(sensor, 200)
-    assert quiet_crossing(sensor, (0, 1, 1), At(20), 500, 100_000) is not None
+    assert within_noise(Rig(), 20)
+    assert not within_noise(Rig(), 200)
+    assert quiet_crossing(Rig(), (0, 1, 1), At(20), 500, 100_000) is not None
 
 
 def test_a_stuck_bit_sits_in_every_sample():
     samples = np.array([-5, 0, 7, 1000], dtype=np.int16)
     assert np.all(with_stuck_bit(samples, 3, True) & 8)
     assert not np.any(with_stuck_bit(samples, 0, False) & 1)
+
+
+def test_a_saturated_record_stands_at_the_rails_beyond_its_share():
+    samples = np.array([[-5000, -10, 0, 399, 410, 8000], [5000] * 6], dtype=np.int16)
+    assert saturated(samples, 14, 0.05).tolist() == [[-8192, -10, 0, 399, 8191, 8191], [5000] * 6]
+
+
+def test_samples_that_are_missing_move_up_what_follows():
+    samples = np.arange(16, dtype=np.int16).reshape(2, 8)
+    assert without(samples, 2, 3).tolist() == [[0, 1, 5, 6, 7, 7, 7, 7], [8, 9, 13, 14, 15, 15, 15, 15]]
+
+
+def test_the_other_channels_see_the_same_motion():
+    rig = Rig(
+        sensor=CLEAN, second_sensor=Sensor(noise_N=0, offset_N=0, ringing=0, gain=0.5),
+        displacement=Displacement(noise_mm=0), accelerometer=Accelerometer(noise_m_s2=0), drop=CAUGHT,
+    )  # fmt: skip
+    drop = Drop(1, rig, Motion(rig), 0.0, 0.25, 0)
+    first, interval, n = -0.2, 1e-5, 24_000
+    F, second, mm, a = (sensors.signal(rig, drop.motion, k, first, interval, n) for k in range(4))
+    assert second == pytest.approx(0.5 * F)
+    t = first + np.arange(n) * interval
+    held = t < -drop.motion.t_fall
+    assert a[held] == pytest.approx(9.80665)
+    assert a[~held] == pytest.approx(F[~held] / 0.503)
+    # Twice differentiated, the displacement is the acceleration that gravity and the specimen make.
+    speed = np.gradient(mm * 1e-3, interval)
+    flying = (t > -drop.motion.t_fall + 1e-4) & (t < -1e-4)
+    assert speed[flying] == pytest.approx(1.39 + 9.80665 * t[flying], abs=1e-6)
+    touching = (t > 1e-4) & (t < 1e-3)
+    assert np.gradient(speed, interval)[touching] == pytest.approx(9.80665 - a[touching], abs=5)
+    assert mm[held] == pytest.approx(sensors.at_rest(rig, 2), abs=1e-9)
+    assert mm.max() == pytest.approx(drop.motion.truth()["alpha_M"] * 1e3, rel=1e-4)
