@@ -111,6 +111,7 @@ class Control:
             "state": State(recorder.state).name.lower(),
             "boot": self._device.memory.boot,
             "held": self._device.held_id,
+            "captured": recorder.captured,
             "moving": tower.moving,
             "interlock": tower.interlock,
             "settings": asdict(tower.rig),

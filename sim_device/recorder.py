@@ -45,6 +45,7 @@ class Recorder:
         self.state = State.HELD if memory.held else State.IDLE
         self.started = time.monotonic_ns()
         self.acquisition: Acquisition | None = None
+        self.captured: dict[str, Any] | None = None
         self._task: asyncio.Task[None] | None = None
 
     def configure(self, **changes: Any) -> None:
@@ -163,7 +164,10 @@ class Recorder:
         self._log(f"record {run.id}: triggered")
         await self._measure(run)
         counts = await asyncio.to_thread(self._take, run)
-        self.memory.hold(self._record(run, flawed(counts, self._rig().sensor.bits, self.faults)))
+        record = self._record(run, flawed(counts, self._rig().sensor.bits, self.faults))
+        self.memory.hold(record)
+        if record.id == run.id:
+            self.captured = {"id": record.id, "crcs": [record.crc(channel) for channel in range(record.channels)]}
         self.state, self._task = State.HELD, None
         self._log(f"record {run.id}: held")
 

@@ -68,12 +68,14 @@ def sim(
     scenario: Annotated[Path | None, typer.Option(help="TOML file with the rig to play.")] = None,
     baud: Annotated[int | None, typer.Option(help="Pace the serial lines at this rate.", min=300)] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of its noise.", min=0)] = None,
+    list_faults: Annotated[bool, typer.Option("--list-faults", help="Print the faults it can play, and end.")] = False,
 ) -> None:
     """Play a rig: SCPI and Modbus on real wires. Prints its endpoints as one JSON line and runs until stopped."""
     from api.process import become_emulator
 
     given = {"--state": state, "--scenario": scenario, "--baud": baud, "--seed": seed}
-    become_emulator([part for k, v in given.items() if v is not None for part in (k, str(v))])
+    listing = ["--list-faults"] if list_faults else []
+    become_emulator([*listing, *(part for k, v in given.items() if v is not None for part in (k, str(v)))])
 
 
 def _take(acquisition: "Acquisition", data: Path, as_json: bool) -> None:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import struct
+import subprocess
+import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 from clients import Modbus, ModbusError, Scpi, Tcp, arm, record, take
-from emulator import Emulator, until
+from emulator import ROOT, Emulator, until
 
 
 @pytest.fixture
@@ -125,3 +128,59 @@ def test_faults_that_are_removed_act_no_more(shared_emulator: Emulator, scpi: Sc
     shared_emulator.do("clear")
     assert scpi.ask("*OPC?") == "1"
     assert acted(shared_emulator) == []
+
+
+def test_a_fault_is_removed_by_its_name(shared_emulator: Emulator, scpi: Scpi):
+    shared_emulator.do("fault", name="drop_byte", nth=1, count=None)
+    shared_emulator.do("fault", name="slow_reply", seconds=0.0, count=None)
+    assert shared_emulator.do("clear", name="drop_byte")["removed"] == 1
+    assert scpi.ask("*OPC?") == "1"
+    assert [fault["name"] for fault in shared_emulator.do("status")["faults"]] == ["slow_reply"]
+    answer = shared_emulator.control(do="clear", name="drop_byte")
+    assert not answer["ok"]
+    assert "slow_reply" in answer["error"]
+
+
+def test_replies_are_let_pass_before_a_fault_strikes(shared_emulator: Emulator, scpi: Scpi):
+    shared_emulator.do("fault", name="flip_byte", command="*OPC?", nth=1, bit=0, skip=2)
+    assert [scpi.ask("*OPC?") for _ in range(4)] == ["1", "1", "0", "1"]
+
+
+def test_a_scenario_file_sets_faults(tmp_path: Path):
+    scenario = tmp_path / "rig.toml"
+    scenario.write_text(
+        '[recorder]\nchannels = 2\n[[fault]]\nname = "flip_byte"\ncommand = "*OPC?"\nnth = 1\nbit = 0\n'
+    )
+    with Emulator("--scenario", scenario) as emulator, Scpi(emulator.endpoints["scpi_tcp"]) as scpi:
+        assert scpi.ask("*OPC?") == "0"
+        assert scpi.ask("TRAC:CAT?") == '"CH1,CH2"'
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('[[fault]]\nname = "flip_bite"\n', ["flip_bite", "flip_byte"]),
+        ('[fault]\nname = "flip_byte"\n', ["[[fault]]"]),
+        ('[[fault]]\nname = "missing_trigger"\ncommand = "INIT"\n', ["missing_trigger", "no command"]),
+    ],
+)
+def test_a_wrong_fault_in_a_scenario_is_told(tmp_path: Path, text: str, words: list[str]):
+    scenario = tmp_path / "rig.toml"
+    scenario.write_text(text)
+    done = subprocess.run(
+        [sys.executable, "-m", "sim_device", "--scenario", scenario],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.returncode == 1
+    assert all(word in done.stderr for word in words), done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_the_manual_has_the_catalogue_as_the_emulator_prints_it():
+    done = subprocess.run(
+        [sys.executable, "-m", "sim_device", "--list-faults"], cwd=ROOT, capture_output=True, text=True
+    )
+    assert done.stdout in (ROOT / "docs" / "device-protocol.md").read_text(encoding="utf-8")
