@@ -54,7 +54,7 @@ def acquire(
         raise AcquisitionError("aborted", "disarmed as asked; no drop was recorded")
     started = now()
     header = again(device, device.header)
-    _check_header(header, armed, wanted)
+    _check_header(header, armed, wanted, emit)
     return finish(rig, header, test, texts, run, series, started, store, journal, emit)
 
 
@@ -171,18 +171,24 @@ def _wait(device: Device, armed: Status, wanted: Settings, wait_s: float, stop: 
         time.sleep(POLL_S)
 
 
-def _check_header(header: Header, armed: Status, wanted: Settings) -> None:
-    first = wanted.delay_ns - wanted.pretrigger * wanted.interval_ns
-    expected = (armed.last, armed.boot, wanted.config_hash(), wanted.points, wanted.interval_ns, first)
-    found = (
-        header.record_id,
-        header.boot,
-        header.config_hash,
-        header.points,
-        header.interval_ns,
-        header.first_sample_ns,
-    )
+def _check_header(header: Header, armed: Status, wanted: Settings, emit: Emit) -> None:
+    """The held record is the one that was armed, and told where it is not as it was asked for.
+
+    Raises
+    ------
+    AcquisitionError : `stale`, it is another one; still held.
+    """
+    expected = (armed.last, armed.boot, wanted.config_hash())
+    found = (header.record_id, header.boot, header.config_hash)
     if found != expected:
         raise AcquisitionError(
             "stale", f"the held record is not the one that was armed: {found} for {expected}; still held"
         )
+    asked = {
+        "points": wanted.points,
+        "interval_ns": wanted.interval_ns,
+        "first_sample_ns": wanted.delay_ns - wanted.pretrigger * wanted.interval_ns,
+    }
+    differ = [f"{k}: asked {v}, got {getattr(header, k)}" for k, v in asked.items() if getattr(header, k) != v]
+    if differ:
+        emit("not-as-configured", record_id=header.record_id, text=f"{'; '.join(differ)}; saved as it is")

@@ -150,6 +150,9 @@ class _Reader:
                 crc = device.crc(span.channel, span.start, span.count)
                 if crc32(samples) != crc:
                     raise BadReply("the CRC-32 does not match")
+                if (held := device.status().held) != self._header.record_id:
+                    # The CRC-32 was right, but of another record: nothing of it belongs here.
+                    raise BadReply(f"the recorder holds record {held} by now")
                 self._chunks.add(span.channel, span.start, samples, crc)
                 return samples
             except (LinkError, DeviceError) as e:
