@@ -151,7 +151,8 @@ class Contact:
         x = np.full_like(t, self.x_end)
         for piece in self.pieces:
             inside = (t >= piece.start) & (t < piece.end)
-            x[inside] = piece.solution(t[inside])[0]
+            if inside.any():
+                x[inside] = piece.solution(t[inside])[0]
         return x
 
 
