@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 INSTALL := $(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: setup demo test coverage bench kills lint clean
+.PHONY: setup demo test coverage bench faults kills lint clean
 setup: .venv/installed
 
 .venv/installed: pyproject.toml constraints.txt
@@ -28,14 +28,21 @@ test: .venv/installed-dev
 coverage: .venv/installed-dev
 	$(BIN)/python bench/coverage_events.py
 
-# Readout against bare loops on the same wires; ten minutes, most of it at 115,200 baud.
+# Readout and storage against bare loops on the same wires and disk; ten minutes, most of it at 115,200 baud.
 bench: .venv/installed-dev
 	$(BIN)/python bench/wires.py
+	$(BIN)/python bench/durable.py
 
-# The host killed a thousand times, at every step of a drop; half an hour. CI runs 40.
+# Every fault on every wire, a quarter of an hour; the table goes into the manual. CI plays a seeded draw.
+FAULTS ?= --write docs/faults.md
+faults: .venv/installed-dev
+	$(BIN)/python bench/faults.py $(FAULTS)
+
+# The host killed a thousand times, and then the emulator, at every step of a drop; an hour. CI runs 40.
 KILLS ?= 1000
 kills: .venv/installed-dev
-	$(BIN)/python bench/kills.py --kills $(KILLS)
+	$(BIN)/python bench/kills.py --of host --kills $(KILLS)
+	$(BIN)/python bench/kills.py --of emulator --kills $(KILLS)
 
 lint: .venv/installed-dev
 	$(BIN)/ruff check .

@@ -1,13 +1,15 @@
-"""Kill the host (-9) at each step of an acquisition, recover, and see that nothing is lost.
+"""Kill the host, or the emulator, (-9) at each step of a drop, recover, and see that nothing is lost.
 
-    .venv/bin/python bench/kills.py [--kills 1000] [--seed 1]
+    .venv/bin/python bench/kills.py [--of host|emulator] [--kills 1000] [--seed 1] [--progress FILE]
 
-Each drop is a real one on the emulator. All steps are hit alike, up to 30 ms after they were told; `recover` then has
-to leave exactly one whole run of the record, the recorder released, and what was reported saved unchanged. Prints the
-histogram; exit 1 if anything was lost.
+Each drop is a real one. All steps are hit alike, up to 30 ms after the host told them. `recover` then has to leave
+exactly one whole run of a record that was captured, the recorder free, and what was reported saved unchanged; a device
+that died before its record was complete has captured nothing, and that has to be told. Prints the histogram; exit 1 if
+anything was lost. With --progress a study that was broken off goes on where it stopped.
 """
 
 import argparse
+import json
 import random
 import sys
 import tempfile
@@ -24,89 +26,123 @@ from daq.store import Store
 
 STEPS = ("connected", "configured", "armed", "triggered", "reading", "progress", "saved", "released")
 SAMPLES = 100_000
+AT_REST = ("idle", "armed", "held")
 
 
-def state(emulator: Emulator) -> str:
-    """The recorder's state in words."""
-    return str(emulator.do("status")["state"])
+class Study:
+    """One data folder and one recorder, over many kills."""
 
+    def __init__(self, folder: Path, of: str, seed: int) -> None:
+        """``of``: who is killed."""
+        self.folder, self.of, self.seed = folder, of, seed
+        self.store = Store(folder / "data")
+        self.emulator = self._start()
 
-def kill_at(step: str, emulator: Emulator, folder: Path, rng: random.Random) -> tuple[bool, str | None]:
-    """Acquire and kill the host at `step`; whether a dart fell on an armed recorder, and what was reported saved."""
-    rig = write_rig(folder, emulator.endpoints["scpi_tcp"], "scpi", samples=SAMPLES)
-    daq = Daq("acquire", rig, folder / "data", "--test", str(write_test(folder)))
-    fell, saved = False, None
-    for event in daq:
-        if event["event"] == "saved":
-            saved = event["run"]
-        if event["event"] == step:
-            time.sleep(rng.uniform(0, 0.03))
-            daq.kill()
-            break
-        if event["event"] == "armed":
-            emulator.do("release")
+    def _start(self) -> Emulator:
+        emulator = Emulator("--seed", str(self.seed), "--state", self.folder / "state")
+        emulator.do("catcher", on=True)
+        emulator.do("height", v0=1.39)
+        return emulator
+
+    def _state(self) -> str:
+        return str(self.emulator.do("status")["state"])
+
+    def _rig(self) -> Path:
+        return write_rig(self.folder, self.emulator.endpoints["scpi_tcp"], "scpi", samples=SAMPLES, wait_s=3.0)
+
+    def kill(self, step: str, rng: random.Random) -> str | None:
+        """A drop with a kill at `step`; what was lost, None if nothing was."""
+        before = set(self.store.runs())
+        daq = Daq("acquire", self._rig(), self.folder / "data", "--test", str(write_test(self.folder)))
+        fell = False
+        for event in daq:
+            if event["event"] == step:
+                time.sleep(rng.uniform(0, 0.03))
+                (daq if self.of == "host" else self.emulator).kill()
+                break
+            if event["event"] == "armed":
+                self.emulator.do("release")
+                fell = True
+        if self.of == "host":
+            for _ in daq:  # what it said in its last moments counts as said
+                pass
+        else:
+            daq.end()
+        daq.close()
+        saved = next((e["run"] for e in daq.events if e["event"] == "saved"), None)
+        captured = self._captured(fell)
+        if self.of == "emulator" and saved is None and daq.events[-1]["event"] != "failed":
+            return f"nothing was told: {daq.events[-1]}"
+        return self._recover(captured, saved, before)
+
+    def _captured(self, fell: bool) -> bool:
+        """Whether the recorder has completed its record."""
+        if self.of == "emulator":
+            log = self.emulator.log
+            self.emulator.stop()
+            self.emulator = self._start()
+            return ": held" in log
+        if not fell and self._state() in ("armed", "filling"):
+            until(lambda: self._state() == "armed")
+            self.emulator.do("release")  # the recorder needs no host to catch a drop
             fell = True
-    # What it said in its last moments counts as said.
-    saved = next((e["run"] for e in daq if e["event"] == "saved"), saved)
-    daq.close()
-    if not fell and "armed" in state(emulator):
-        emulator.do("release")  # the recorder needs no host to catch a drop
-        fell = True
-    until(lambda: not any(word in state(emulator) for word in ("filling", "measuring")), 10)
-    return fell, saved
+        until(lambda: self._state() in AT_REST)
+        return fell
 
-
-def lost(fell: bool, saved: str | None, emulator: Emulator, folder: Path, before: set[str]) -> str | None:
-    """Recover, and say what is wrong; None if nothing is."""
-    rig = folder / "rig.toml"
-    daq = Daq("recover", rig, folder / "data")
-    end = daq.end()
-    daq.close()
-    store = Store(folder / "data")
-    new = set(store.runs()) - before
-    if end["event"] != "done":
-        return f"recover failed: {end['text']}"
-    if "idle" not in state(emulator):
-        return f"the recorder is left {state(emulator)}"
-    if len(new) != int(fell):
-        return f"{len(new)} runs of {int(fell)} drops"
-    for run in new:
-        data = store.read(run)
-        if data.missing or [crc32(c.samples) for c in data.channels] != data.provenance["header"]["crcs"]:
-            return f"run {run} is not what the recorder captured"
-    if saved is not None and saved not in new:
-        return f"run {saved} was reported saved and is not there"
-    return None
+    def _recover(self, captured: bool, saved: str | None, before: set[str]) -> str | None:
+        daq = Daq("recover", self._rig(), self.folder / "data")
+        end = daq.end()
+        daq.close()
+        new = set(self.store.runs()) - before
+        if end["event"] != "done":
+            return f"recover failed: {end['text']}"
+        if self._state() != "idle":
+            return f"the recorder is left {self._state()}"
+        if len(new) != int(captured):
+            return f"{len(new)} runs of {int(captured)} records"
+        for run in new:
+            data = self.store.read(run)
+            if data.missing or [crc32(c.samples) for c in data.channels] != data.provenance["header"]["crcs"]:
+                return f"run {run} is not what the recorder captured"
+        if saved is not None and saved not in new:
+            return f"run {saved} was reported saved and is not there"
+        until(lambda: not self.emulator.do("status")["moving"])
+        return None
 
 
 def main() -> int:
     """Kill, recover, count."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--of", choices=("host", "emulator"), default="host")
     parser.add_argument("--kills", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--progress", type=Path, metavar="FILE", help="where the study stands")
     given = parser.parse_args()
-    rng = random.Random(given.seed)
     hit: Counter[str] = Counter()
     losses: list[str] = []
-    with tempfile.TemporaryDirectory() as name, Emulator("--seed", str(given.seed)) as emulator:
-        folder = Path(name)
-        emulator.do("catcher", on=True)
-        emulator.do("height", v0=1.39)
-        for n in range(given.kills):
+    if given.progress is not None and given.progress.exists():
+        kept = json.loads(given.progress.read_text())
+        if (kept["of"], kept["seed"]) != (given.of, given.seed):
+            parser.error(f"{given.progress} is of another study: {kept['of']}, seed {kept['seed']}")
+        hit, losses = Counter(kept["hit"]), kept["losses"]
+    with tempfile.TemporaryDirectory() as name:
+        study = Study(Path(name), given.of, given.seed)
+        for n in range(hit.total(), given.kills):
             step = STEPS[n % len(STEPS)]
-            until(lambda: not emulator.do("status")["moving"], 10)
-            before = set(Store(folder / "data").runs())
-            fell, saved = kill_at(step, emulator, folder, rng)
-            hit[step] += 1
-            if (wrong := lost(fell, saved, emulator, folder, before)) is not None:
+            if (wrong := study.kill(step, random.Random(given.seed * 1_000_003 + n))) is not None:
                 losses.append(f"kill {n} at {step}: {wrong}")
+            hit[step] += 1
+            if given.progress is not None:
+                state = {"of": given.of, "seed": given.seed, "hit": hit, "losses": losses}
+                given.progress.write_text(json.dumps(state))
             if sys.stderr.isatty() or n % 25 == 24:
                 print(f"{n + 1} of {given.kills} kills, {len(losses)} losses", file=sys.stderr, flush=True)
-        faults = [c for c in Store(folder / "data").verify() if c.faults]
-    print("| killed at | times |\n|---|---|")
+        faults = [c for c in study.store.verify() if c.faults]
+        study.emulator.stop()
+    print(f"| {given.of} killed at | times |\n|---|---|")
     for step in STEPS:
         print(f"| {step} | {hit[step]} |")
-    print(f"\n{given.kills} kills, {len(losses)} lost, {len(faults)} damaged runs")
+    print(f"\n{given.kills} kills of the {given.of}, {len(losses)} lost, {len(faults)} damaged runs")
     print("\n".join(losses))
     return 1 if losses or faults else 0
 

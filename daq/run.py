@@ -30,13 +30,15 @@ class ChannelData:
     bits: int | None = None
     gaps: tuple[tuple[int, int], ...] = ()
 
-    def calibrated(self, part: slice = slice(None)) -> NDArray[np.float64]:
-        """Samples in the channel's unit; NaN in the gaps."""
+    def calibrated(self, part: slice | NDArray[np.int64] = slice(None)) -> NDArray[np.float64]:
+        """Samples in the channel's unit, all or a part (slice, or indices (n,)); NaN in the gaps."""
         scale = self.calibration
-        values = np.asarray(self.samples, dtype=np.float64) * scale.counts_to_unit + scale.offset
-        for start, count in self.gaps:
-            values[start : start + count] = np.nan
-        return values[part]
+        values = np.asarray(self.samples[part], dtype=np.float64) * scale.counts_to_unit + scale.offset
+        if self.gaps:
+            at = np.arange(len(self.samples))[part]
+            for start, count in self.gaps:
+                values[(at >= start) & (at < start + count)] = np.nan
+        return values
 
 
 @dataclass(frozen=True)

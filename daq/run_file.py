@@ -175,12 +175,11 @@ def _write_sample(g: h5py.Group, run: RunData) -> None:
 def _write_preview(g: h5py.Group, run: RunData) -> None:
     """The default plot: least and greatest force of each stretch, so that no peak is missed."""
     force = run.channel("force") or run.channels[0]
-    values = force.calibrated()
-    index = envelope(values, 4000)
+    index = envelope(force.samples, 4000)
     g.attrs["signal"] = "force"
     g.attrs["axes"] = "time"
     g.attrs["time_indices"] = 0
-    data = g.create_dataset("force", data=values[index].astype(np.float32))
+    data = g.create_dataset("force", data=force.calibrated(index).astype(np.float32))
     data.attrs["units"] = force.calibration.unit
     data.attrs["long_name"] = f"Sensor force ({force.calibration.unit}), least and greatest of each stretch"
     axis = g.create_dataset("time", data=(index * run.dt * 1e3).astype(np.float32))
@@ -188,14 +187,15 @@ def _write_preview(g: h5py.Group, run: RunData) -> None:
     axis.attrs["long_name"] = "Time from the first sample (ms)"
 
 
-def envelope(values: NDArray[np.float64], points: int) -> NDArray[np.int64]:
+def envelope(values: NDArray[Any], points: int) -> NDArray[np.int64]:
     """Indices of the least and the greatest value of each of `points`/2 stretches, in order; all if there are fewer."""
     n = len(values)
     if n <= points:
         return np.arange(n, dtype=np.int64)
     stretches = points // 2
     width = -(-n // stretches)
-    padded = np.pad(np.nan_to_num(values, nan=0.0), (0, -n % width), mode="edge").reshape(-1, width)
+    finite = np.nan_to_num(values, nan=0.0) if values.dtype.kind == "f" else values
+    padded = np.pad(finite, (0, -n % width), mode="edge").reshape(-1, width)
     start = np.arange(len(padded), dtype=np.int64) * width
     ends = np.stack([start + padded.argmin(axis=1), start + padded.argmax(axis=1)])
     return np.unique(np.minimum(np.sort(ends, axis=0).T.ravel(), n - 1))

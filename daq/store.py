@@ -57,6 +57,7 @@ class Store:
         except OSError as e:
             shutil.rmtree(part, ignore_errors=True)
             raise StoreError(f"the run could not be written to {self.folder}: {e.strerror or e}") from None
+        del content  # as large as the record, and not needed to read back
         self._read_back(run, digest)
         return digest
 
@@ -100,7 +101,7 @@ class Store:
             os.posix_fadvise(fd, 0, 0, os.POSIX_FADV_DONTNEED)  # so that the disk answers and not the cache
         finally:
             os.close(fd)
-        if hashlib.sha256(path.read_bytes()).hexdigest() != digest:
+        if self.sha256(run.run) != digest:
             raise StoreError(f"{path} reads back different from what was written: the disk is not to be trusted")
         run_file.read(path)
 
