@@ -22,8 +22,8 @@ def record_of(run: RunData) -> tuple[Record, int]:
     rails = lsb = None
     if force.bits is not None:
         half = 2 ** (force.bits - 1)
-        ends = sorted((counts * scale.counts_to_unit + scale.offset) for counts in (-half, half - 1))
-        rails, lsb = (ends[0], ends[1]), abs(scale.counts_to_unit)
+        ends = sorted((counts * scale.scale + scale.offset) for counts in (-half, half - 1))
+        rails, lsb = (ends[0], ends[1]), abs(scale.scale)
     acceleration = run.channel("acceleration")
     record = Record(
         force=force.calibrated(part),
@@ -31,7 +31,11 @@ def record_of(run: RunData) -> tuple[Record, int]:
         rails=rails,
         lsb=lsb,
         time_constant=scale.time_constant_s,
-        gate_edges=tuple((e - (run.first_sample_ns or 0)) * 1e-9 - shift for e in run.gate_edges_ns),
+        gate_edges=tuple(
+            (e - (run.first_sample_ns or 0)) * 1e-9 - shift if run.gate_on_clock else e * 1e-9
+            for e in run.gate_edges_ns
+        ),
+        gate_on_record_clock=run.gate_on_clock,
         pretrigger=None if run.pretrigger is None else max(0, run.pretrigger - part.start),
         acceleration=None if acceleration is None or acceleration.gaps else acceleration.calibrated(part),
     )
@@ -82,7 +86,7 @@ def impact_of(run: RunData) -> Impact:
         ),
         u_mass=test.dart.u.get("mass_kg", 0.0),
         u_tip_mass=test.dart.u.get("tip_mass_kg", 0.0),
-        u_gain=math.fabs(scale.u.get("counts_to_unit", 0.0) / scale.counts_to_unit),
+        u_gain=math.fabs(scale.u.get("counts_to_unit", 0.0) / scale.scale),
     )
 
 

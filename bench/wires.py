@@ -26,6 +26,7 @@ from emulator import Emulator, address, until
 from daq.chunks import Chunks
 from daq.modbus import Modbus
 from daq.modbus_device import ModbusDevice
+from daq.profile import ModbusProfile, ScpiProfile, load_profile
 from daq.readout import read_record
 from daq.recorder import Device
 from daq.scpi_device import ScpiDevice
@@ -60,6 +61,20 @@ def hold(emulator: Emulator, samples: int) -> None:
         until(lambda: condition() == 40)
         emulator.do("release")
         until(lambda: condition() == 256, 30)
+
+
+def scpi_device(port: str, baud: int) -> ScpiDevice:
+    """The driver as a rig file without a profile has it."""
+    profile, _ = load_profile("droptower-scpi", "scpi")
+    assert isinstance(profile, ScpiProfile)
+    return ScpiDevice(port, baud, profile, 1)
+
+
+def modbus_device(port: str, baud: int) -> ModbusDevice:
+    """As above."""
+    profile, _ = load_profile("droptower-modbus", "modbus")
+    assert isinstance(profile, ModbusProfile)
+    return ModbusDevice(port, baud, 1, profile, 1)
 
 
 def whole(device: Device) -> Timed:
@@ -128,7 +143,7 @@ def scpi_paced(baud: int, tries: int) -> None:
     samples = 100_000
     with Emulator("--baud", str(baud)) as emulator:
         hold(emulator, samples)
-        device = ScpiDevice(emulator.endpoints["scpi_pty"], baud)
+        device = scpi_device(emulator.endpoints["scpi_pty"], baud)
         bare = bare_line(emulator.endpoints["scpi_pty"], samples)
         ratio(f"SCPI block, pty at {baud:,} baud, 100,000 samples", 0.98, bare, whole(device), tries)
         device.close()
@@ -138,7 +153,7 @@ def rtu_paced(baud: int, reach: float, tries: int) -> None:
     samples = 20_000
     with Emulator("--baud", str(baud)) as emulator:
         hold(emulator, samples)
-        device = ModbusDevice(emulator.endpoints["modbus_rtu"], baud, 1)
+        device = modbus_device(emulator.endpoints["modbus_rtu"], baud)
         ours = whole(device)
         ratio(
             f"Modbus RTU, pty at {baud:,} baud, 20,000 samples", reach,
@@ -152,10 +167,10 @@ def scpi_unpaced(tries: int) -> None:
     with Emulator() as emulator:
         hold(emulator, samples)
         pty, tcp = emulator.endpoints["scpi_pty"], emulator.endpoints["scpi_tcp"]
-        device: Device = ScpiDevice(pty, 921600)
+        device: Device = scpi_device(pty, 921600)
         ratio("SCPI, pty without pace, 1,000,000 samples", 0.6, bare_line(pty, samples), whole(device), tries)
         device.close()
-        device = ScpiDevice(tcp, 921600)
+        device = scpi_device(tcp, 921600)
         ratio("SCPI, TCP, 1,000,000 samples", 0.5, bare_tcp(tcp, samples), whole(device), tries)
         device.close()
 
@@ -171,7 +186,7 @@ def modbus_tcp(tries: int) -> None:
 
     def ours() -> None:
         for start in range(0, count, 50_000):
-            bus.bulk(0, min(50_000, count - start), 16)
+            bus.bulk(4, 0, min(50_000, count - start), 16)
 
     def pymodbus_async() -> None:
         async def read() -> None:

@@ -37,6 +37,13 @@ def _emit(event: str, **facts: Any) -> None:
         print(json.dumps({"event": event, "at": now(), **facts}), flush=True)
 
 
+def _span(text: str) -> tuple[int, int]:
+    start, _, stop = text.partition(":")
+    if not (start.isdigit() and stop.isdigit() and int(start) < int(stop)):
+        raise argparse.ArgumentTypeError(f"{text!r} is not START:STOP with START below STOP")
+    return int(start), int(stop)
+
+
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m daq", description=__doc__)
     parser.add_argument("do", choices=["acquire", "recover", "check"])
@@ -47,6 +54,8 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument(
         "--give-up", action="store_true", help="release a record of which a partial run is all there is"
     )
+    parser.add_argument("--spare", type=Path, help="where a run goes that --data does not take")
+    parser.add_argument("--first", type=_span, metavar="START:STOP", help="samples that are read before the rest")
     given = parser.parse_args()
     if given.do == "acquire" and given.test is None:
         parser.error("acquire needs --test")
@@ -58,7 +67,7 @@ def _arguments() -> argparse.Namespace:
 def _run(given: argparse.Namespace) -> str | None:
     file, rig_text = load_rig(given.rig)
     test = load_test(given.test) if given.test is not None else None
-    with RigLock(file, given.do), Rig(file) as rig:
+    with RigLock(file, given.do), Rig(file, given.data) as rig:
         if given.do == "check":
             if not check(rig, _emit):
                 raise DeviceError("the rig is not ready: see the checks")
@@ -67,7 +76,9 @@ def _run(given: argparse.Namespace) -> str | None:
         if given.do == "recover":
             return recover(rig, rig_text, test, store, _emit, given.give_up)
         assert test is not None, "the arguments were checked"
-        return acquire(rig, test[0], (rig_text, test[1]), store, given.series, _emit, lambda: _stop)
+        spare = None if given.spare is None else Store(given.spare)
+        texts = (rig_text, test[1])
+        return acquire(rig, test[0], texts, store, given.series, _emit, lambda: _stop, given.first, spare)
 
 
 def main() -> int:

@@ -1,14 +1,16 @@
 """One drop: configure, read back, arm, confirm, wait, read, check, write, re-read, and only then release the record."""
 
+import contextlib
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
-from daq.errors import AcquisitionError, DeviceError, NoReply
-from daq.finish import Emit, finish
+from daq.errors import AcquisitionError, DeviceError, LinkError, NoReply
+from daq.finish import Drop, Emit, finish
 from daq.journal import Journal
-from daq.readout import again
-from daq.recorder import Condition, Device, Header, Interlock, Settings, Status
+from daq.readout import Span, again
+from daq.recorder import Condition, Device, GateReading, Header, Interlock, Settings, Status
 from daq.rig import Rig, wanted_settings
 from daq.run import new_run_id, now
 from daq.store import Store
@@ -27,8 +29,12 @@ def acquire(
     series: str | None,
     emit: Emit,
     stop: Callable[[], bool],
+    first: Span | None = None,
+    spare: Store | None = None,
 ) -> str:
     """Take one drop into the store; its run id. `texts` are those of the rig and the test file.
+
+    first : samples of the record that are read before the rest; spare : where a run goes that the store does not take
 
     Raises
     ------
@@ -36,7 +42,7 @@ def acquire(
     LinkError, DeviceError, StoreError : as they say; what the recorder holds it still holds.
     """
     device, file = rig.recorder, rig.file
-    wanted = wanted_settings(file)
+    wanted = wanted_settings(file, rig.profile)
     emit("connected", recorder=rig.identity, port=file.recorder.port)
     _refuse_held(settle(device, emit))
     store.check_writable(2 * wanted.points * len(file.recorder.channel) + 1_000_000)
@@ -45,17 +51,46 @@ def acquire(
     _await_interlock(rig, stop, emit)
     run = new_run_id()
     journal = Journal(store.folder, rig.identity)
-    note = {"run": run, "series": series, "rig_text": texts[0], "test_text": texts[1]}
+    counter = Counter.of(rig)
+    note = {"run": run, "series": series, "rig_text": texts[0], "test_text": texts[1], "passages": counter.before}
     note |= {"test": test.model_dump(mode="json", by_alias=True, exclude_none=True), "noted_at": now()}
     armed = _arm(device, wanted, journal, note, emit)
-    held = _wait(device, armed, wanted, file.recorder.wait_s, stop, emit)
-    if not held:
+    if not _wait(device, armed, wanted, file.recorder.wait_s, stop, counter, emit):
         journal.remove()
         raise AcquisitionError("aborted", "disarmed as asked; no drop was recorded")
-    started = now()
+    drop = Drop(run, series, now(), test, texts, first, spare, counter.before, counter.reading)
     header = again(device, device.header)
     _check_header(header, armed, wanted, emit)
-    return finish(rig, header, test, texts, run, series, started, store, journal, emit)
+    return finish(rig, header, drop, store, journal, emit)
+
+
+@dataclass
+class Counter:
+    """A gate that only counts passages: read again and again, as what it shows is gone with the next passage."""
+
+    gate: Device | None
+    before: int | None = None
+    reading: GateReading | None = None
+
+    @classmethod
+    def of(cls, rig: Rig) -> "Counter":
+        """The rig's gate, if it is one, with what it has counted so far."""
+        if rig.gate is None:
+            return cls(None)
+        try:
+            reading = again(rig.gate, rig.gate.gate)
+        except (LinkError, DeviceError):
+            return cls(None)  # told when its reading is asked for
+        return cls(None) if reading.on_clock else cls(rig.gate, reading.passages)
+
+    def look(self) -> None:
+        """Keep the first passage after arming."""
+        if self.gate is None or self.before is None or self.reading is not None:
+            return
+        with contextlib.suppress(LinkError, DeviceError):
+            reading = self.gate.gate()
+            if reading.passages == self.before + 1:
+                self.reading = reading
 
 
 def settle(device: Device, emit: Emit) -> Status:
@@ -87,11 +122,8 @@ def _refuse_held(status: Status) -> None:
 
 def _configure(device: Device, wanted: Settings) -> None:
     device.configure(wanted)
-    found = again(device, device.settings)
-    if found != wanted:
-        differ = [k for k in wanted.__dict__ if wanted.__dict__[k] != found.__dict__[k]]
-        told = "; ".join(f"{k}: asked {wanted.__dict__[k]}, got {found.__dict__[k]}" for k in differ)
-        raise DeviceError(f"the recorder does not take its settings: {told}; change them in the rig file")
+    if differ := wanted.differences(again(device, device.settings)):
+        raise DeviceError(f"the recorder does not take its settings: {'; '.join(differ)}; change them in the rig file")
 
 
 def _await_interlock(rig: Rig, stop: Callable[[], bool], emit: Emit) -> None:
@@ -142,12 +174,21 @@ def _arm(device: Device, wanted: Settings, journal: Journal, note: dict[str, Any
     return status
 
 
-def _wait(device: Device, armed: Status, wanted: Settings, wait_s: float, stop: Callable[[], bool], emit: Emit) -> bool:
+def _wait(
+    device: Device,
+    armed: Status,
+    wanted: Settings,
+    wait_s: float,
+    stop: Callable[[], bool],
+    counter: Counter,
+    emit: Emit,
+) -> bool:
     """Whether a record came: True once it is held, False if it was stopped before the trigger."""
     end = time.monotonic() + wait_s
     measuring = False
     while True:
         status = again(device, device.status)
+        counter.look()
         if status.boot != armed.boot:
             raise AcquisitionError("stale", "the recorder was reset while armed: whatever fell was not recorded")
         if status.held == armed.last:

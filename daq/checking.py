@@ -8,6 +8,7 @@ import numpy as np
 from daq.acquisition import settle
 from daq.errors import AcquisitionError, DeviceError, LinkError
 from daq.finish import POLL_S, Emit
+from daq.profile import ScpiProfile
 from daq.readout import again
 from daq.recorder import Condition, Counts, Device, Header, Interlock, Settings
 from daq.rig import Rig, wanted_settings
@@ -44,25 +45,38 @@ def check(rig: Rig, emit: Emit) -> bool:
         raise AcquisitionError("held", f"the recorder holds record {status.held}; `droptower recover` saves it first")
     rows = [
         Check("identity", True, rig.identity),
-        Check("known word", True, "byte and word order are settled by the device's known word"),
-        _settings(device, wanted_settings(rig.file)),
+        *_abilities(rig),
+        settings := _settings(device, wanted_settings(rig.file, rig.profile)),
         *_interlock(rig),
         *_gate(rig),
     ]
-    if rows[2].ok:
-        rows += _quiet_record(device, rig.file)
+    if settings.ok and rig.profile.keeps_records:
+        rows += _quiet_record(device, rig)
     for row in rows:
         emit("check", **asdict(row))
     return all(row.ok for row in rows)
 
 
+def _abilities(rig: Rig) -> list[Check]:
+    """What the recorder's profile can and cannot do for a record."""
+    p = rig.profile
+    order = p.data.order if isinstance(p, ScpiProfile) and p.data is not None else getattr(p, "order", "high-first")
+    settled = "settled by the device's known word" if order == "sentinel" else f"{order}, as the profile says"
+    ledger = "none: the host keeps the ledger, and arms over nothing that is not stored; no record is taken to check"
+    return [
+        Check("profile", True, f"{rig.file.recorder.profile_name}, tried on {p.tried_on}"),
+        Check("byte order", True, settled),
+        Check("acknowledgement", True, "kept until it is acknowledged" if p.keeps_records else ledger),
+        Check("CRC", True, "of every chunk and record" if p.has_crc else "none: every chunk is read twice"),
+    ]
+
+
 def _settings(device: Device, wanted: Settings) -> Check:
     try:
         device.configure(wanted)
-        found = again(device, device.settings)
+        differ = wanted.differences(again(device, device.settings))
     except DeviceError as e:
         return Check("settings", False, f"{e}; change them in the rig file")
-    differ = [f"{k}: asked {v}, got {found.__dict__[k]}" for k, v in wanted.__dict__.items() if v != found.__dict__[k]]
     took = f"{1e9 / wanted.interval_ns:g} Hz, {wanted.points} samples, {wanted.pretrigger} before the trigger"
     return Check("settings", not differ, "; ".join(differ) or took)
 
@@ -86,12 +100,15 @@ def _gate(rig: Rig) -> list[Check]:
         free = again(rig.gate, rig.gate.beam_free)
     except LinkError as e:
         return [Check("gate", False, str(e))]
+    if free is None:
+        return [Check("gate", True, "it answers; its profile does not say whether the beam is free")]
     return [Check("gate", free, "the beam is free" if free else "the beam is broken: clear it, or align the gate")]
 
 
-def _quiet_record(device: Device, file: RigFile) -> list[Check]:
+def _quiet_record(device: Device, rig: Rig) -> list[Check]:
     """A record of nothing, triggered at once and let go again: noise, zero level, pre-trigger and link speed."""
-    wanted = wanted_settings(file)
+    file = rig.file
+    wanted = wanted_settings(file, rig.profile)
     points = max(wanted.pretrigger + 1, min(wanted.points, NOISE_POINTS))
     quiet = replace(wanted, source="IMM", points=points)
     device.configure(quiet)
@@ -104,9 +121,9 @@ def _quiet_record(device: Device, file: RigFile) -> list[Check]:
         time.sleep(POLL_S)
     header = again(device, device.header)
     started = time.monotonic()
-    samples = again(device, lambda: device.read(1, 0, points))
+    samples = again(device, lambda: device.chunk(1, 0, points)).samples
     took = time.monotonic() - started
-    device.acknowledge(header.record_id, header.crcs[0])
+    device.acknowledge(header.record_id, header.crcs[0] or 0)
     return [_pretrigger(header, quiet), _noise(samples, quiet, file), _speed(2 * points / took, file)]
 
 
@@ -120,9 +137,9 @@ def _noise(samples: Counts, settings: Settings, file: RigFile) -> Check:
     channel = file.recorder.channel[0]
     zero, noise = float(np.mean(samples)), float(np.std(samples))
     apart = (settings.level - zero) * (1 if settings.slope == "POS" else -1)
-    scale = abs(channel.counts_to_unit)
+    scale = abs(channel.scale)
     text = (
-        f"noise {noise * scale:.3g} {channel.unit}, zero level {zero * channel.counts_to_unit + channel.offset:.3g} "
+        f"noise {noise * scale:.3g} {channel.unit}, zero level {zero * channel.scale + channel.offset:.3g} "
         f"{channel.unit}, trigger level {apart * scale:.3g} {channel.unit} away"
     )
     if apart <= CLEAR_OF_NOISE * noise:

@@ -15,10 +15,12 @@ from pymodbus.exceptions import ModbusException
 from pymodbus.pdu import ModbusPDU
 
 from daq.errors import BadReply, DeviceError, LinkError, NoReply
-from daq.modbus_bulk import exception_words, read_rtu, read_tcp
+from daq.modbus_bulk import PER_READ, exception_words, read_rtu, read_tcp
 
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 logging.getLogger("pymodbus").propagate = False  # what it has to say is raised below, in the operator's words
+
+KINDS = {3: "holding", 4: "input"}
 
 
 class Modbus:
@@ -31,7 +33,7 @@ class Modbus:
 
     def __init__(self, port: str, baud: int, unit_id: int, timeout_s: float = 1.0) -> None:
         self.port = port
-        self._unit = unit_id
+        self.unit = unit_id
         self._timeout_s = timeout_s
         self._rtu = not port.startswith("tcp://")
         if self._rtu:
@@ -69,36 +71,34 @@ class Modbus:
             raise BadReply(f"port {self.port}: {what}: {len(reply.registers)} registers came for {count}")
         return list(reply.registers)
 
-    def input(self, address: int, count: int) -> list[int]:
-        """`count` (1 to 125) input registers."""
-        what = f"input registers {address} to {address + count - 1}"
-        reply = self._ask(what, lambda: self._client.read_input_registers(address, count=count, device_id=self._unit))
-        return self._registers(what, reply, count)
+    def read(self, function: int, address: int, count: int) -> list[int]:
+        """`count` (1 to 125) holding registers (function 3) or input registers (4)."""
+        what = f"{KINDS[function]} registers {address} to {address + count - 1}"
+        call = self._client.read_holding_registers if function == 3 else self._client.read_input_registers
+        return self._registers(what, self._ask(what, lambda: call(address, count=count, device_id=self.unit)), count)
 
-    def bulk(self, address: int, count: int, at_once: int) -> NDArray[np.uint16]:
-        """`count` input registers, of any number, at the wire's own speed; on TCP with `at_once` requests in flight."""
+    def bulk(
+        self, function: int, address: int, count: int, at_once: int, per_read: int = PER_READ
+    ) -> NDArray[np.uint16]:
+        """`count` registers, of any number, at the wire's own speed; on TCP with `at_once` requests in flight."""
         if not self._client.connected:
             self._connect()
         link = self._client.socket
         try:
             if isinstance(link, serial.Serial):
-                return read_rtu(link, self._unit, 4, address, count)
+                return read_rtu(link, self.unit, function, address, count, per_read)
             assert link is not None, "a connected client has its socket"
             link.settimeout(self._timeout_s)
-            return read_tcp(link, self._unit, 4, address, count, at_once)
+            return read_tcp(link, self.unit, function, address, count, at_once, per_read)
         except (LinkError, DeviceError) as e:
-            raise type(e)(f"port {self.port}: input registers {address} to {address + count - 1}: {e}") from None
-
-    def holding(self, address: int, count: int) -> list[int]:
-        """`count` (1 to 125) holding registers."""
-        what = f"holding registers {address} to {address + count - 1}"
-        reply = self._ask(what, lambda: self._client.read_holding_registers(address, count=count, device_id=self._unit))
-        return self._registers(what, reply, count)
+            raise type(e)(
+                f"port {self.port}: {KINDS[function]} registers {address} to {address + count - 1}: {e}"
+            ) from None
 
     def write(self, address: int, values: Sequence[int]) -> None:
         """Write holding registers in one request, once."""
         what = f"writing holding registers {address} to {address + len(values) - 1}"
-        self._ask(what, lambda: self._client.write_registers(address, list(values), device_id=self._unit))
+        self._ask(what, lambda: self._client.write_registers(address, list(values), device_id=self.unit))
 
     def drain(self) -> None:
         """Forget what is under way, so that no late reply is taken for the next one."""
@@ -121,15 +121,3 @@ class Modbus:
 
     def close(self) -> None:
         self._client.close()
-
-
-def join(registers: Sequence[int], signed: bool = False) -> int:
-    """The integer of two or four registers, most significant first."""
-    data = b"".join(r.to_bytes(2, "big") for r in registers)
-    return int.from_bytes(data, "big", signed=signed)
-
-
-def split(value: int, registers: int) -> list[int]:
-    """The registers of an integer, most significant first; a negative one as two's complement."""
-    data = value.to_bytes(2 * registers, "big", signed=value < 0)
-    return [int.from_bytes(data[i : i + 2], "big") for i in range(0, len(data), 2)]

@@ -36,8 +36,10 @@ def exception_words(code: int) -> str:
     return f"exception {code:02d}, {EXCEPTIONS.get(code, 'unknown')}"
 
 
-def read_tcp(link: socket.socket, unit: int, function: int, address: int, count: int, at_once: int) -> Registers:
-    """`count` registers from `address`, at most `at_once` requests in flight.
+def read_tcp(
+    link: socket.socket, unit: int, function: int, address: int, count: int, at_once: int, per_read: int = PER_READ
+) -> Registers:
+    """`count` registers from `address`, `per_read` a request, at most `at_once` requests in flight.
 
     Raises
     ------
@@ -45,8 +47,8 @@ def read_tcp(link: socket.socket, unit: int, function: int, address: int, count:
     BadReply : a reply is not the next one in order, or not of the length asked for.
     DeviceError : the device answered with an exception.
     """
-    starts = range(address, address + count, PER_READ)
-    sizes = [min(PER_READ, address + count - a) for a in starts]
+    starts = range(address, address + count, per_read)
+    sizes = [min(per_read, address + count - a) for a in starts]
     requests = [
         struct.pack(">HHHBBHH", t & 0xFFFF, 0, 6, unit, function, a, n)
         for t, (a, n) in enumerate(zip(starts, sizes, strict=True))
@@ -96,7 +98,9 @@ def _take_replies(
     return done, filled
 
 
-def read_rtu(line: serial.Serial, unit: int, function: int, address: int, count: int) -> Registers:
+def read_rtu(
+    line: serial.Serial, unit: int, function: int, address: int, count: int, per_read: int = PER_READ
+) -> Registers:
     """`count` registers from `address`; the silence of 3.5 characters is kept between a reply and the next request.
 
     Raises
@@ -106,8 +110,8 @@ def read_rtu(line: serial.Serial, unit: int, function: int, address: int, count:
     characters = 11 / line.baudrate
     silence = 1.75e-3 if line.baudrate > 19200 else 3.5 * characters
     out = np.empty(count, dtype=np.uint16)
-    for start in range(0, count, PER_READ):
-        n = min(PER_READ, count - start)
+    for start in range(0, count, per_read):
+        n = min(per_read, count - start)
         request = struct.pack(">BBHH", unit, function, address + start, n)
         reply = _exchange(line, request + FramerRTU.compute_CRC(request).to_bytes(2, "big"), 5 + 2 * n)
         ended = time.monotonic()

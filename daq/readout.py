@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from daq.chunks import Chunks
-from daq.errors import BadReply, DeviceError, LinkError
+from daq.errors import BadReply, DeviceError, LinkError, NoReply
 from daq.recorder import Counts, Device, Header, crc32
 
 CHUNK = 10_000
@@ -23,9 +23,14 @@ PIECE_TRIES = 2
 HOPELESS = 8
 """Pieces in a row that did not come: then the rest is not asked for."""
 
+RECONNECT_S = 5.0
+"""How long a link that is gone is waited for: long enough to push a plug back in."""
+
 T = TypeVar("T")
 Progress = Callable[[int, int], None]
 """Called with samples read and samples in all."""
+Span = tuple[int, int]
+"""First sample of a stretch, and the one after its last."""
 
 
 @dataclass(frozen=True)
@@ -51,14 +56,31 @@ class Readout:
         return [[g.channel, g.start, g.count] for g in self.gaps]
 
 
-def read_record(device: Device, header: Header, chunks: Chunks, progress: Progress) -> Readout:
+def read_record(
+    device: Device,
+    header: Header,
+    chunks: Chunks,
+    progress: Progress,
+    first: Span | None = None,
+    first_read: Callable[[], None] = lambda: None,
+) -> Readout:
     """The held record, going on from what `chunks` has of it.
+
+    first : stretch that is read before the rest, on all channels; `first_read` is called once it is there
 
     Raises
     ------
     LinkError : the wire is gone, or nothing at all came; the record is still held and what was read is noted.
     """
-    return _read(_Reader(device, header, chunks, progress), header, chunks)
+    reader = _Reader(device, header, chunks, progress)
+    missing: list[Gap] = []
+    if first is not None:
+        start, stop = max(0, first[0]), min(header.points, first[1])
+        missing += reader.take_all((start, stop))
+        if start < stop and not missing:
+            first_read()
+    missing += reader.take_all((0, header.points))
+    return _read(reader, missing, header, chunks)
 
 
 def read_noted(header: Header, chunks: Chunks) -> Readout:
@@ -68,11 +90,11 @@ def read_noted(header: Header, chunks: Chunks) -> Readout:
     ------
     LinkError : that is nothing.
     """
-    return _read(_Reader(None, header, chunks, lambda done, total: None), header, chunks)
+    reader = _Reader(None, header, chunks, lambda done, total: None)
+    return _read(reader, reader.take_all((0, header.points)), header, chunks)
 
 
-def _read(reader: "_Reader", header: Header, chunks: Chunks) -> Readout:
-    missing = reader.take_all()
+def _read(reader: "_Reader", missing: list[Gap], header: Header, chunks: Chunks) -> Readout:
     gaps: list[Gap] = []
     in_a_row = 0
     for piece in (piece for span in missing for piece in _pieces(span)):
@@ -83,7 +105,7 @@ def _read(reader: "_Reader", header: Header, chunks: Chunks) -> Readout:
     if reader.done == 0:
         raise LinkError(f"nothing of the record could be read: {reader.last}; the recorder still holds it")
     for number, stated in enumerate(header.crcs, 1):
-        whole = not any(gap.channel == number for gap in gaps)
+        whole = stated is not None and not any(gap.channel == number for gap in gaps)
         if whole and (found := crc32(reader.channels[number - 1])) != stated:
             chunks.remove()
             raise BadReply(f"channel {number} has CRC-32 {found:08x}, the recorder states {stated:08x}; still held")
@@ -95,31 +117,35 @@ class _Reader:
         self._device, self._header, self._chunks, self._progress = device, header, chunks, progress
         self.channels = [np.zeros(header.points, dtype=np.int16) for _ in header.crcs]
         self._had = [np.zeros(header.points, dtype=np.bool_) for _ in header.crcs]
+        self._size = CHUNK
         self.done = 0
         self.held = device is not None
         self.last: Exception | None = None
         for (channel, start), samples in chunks.noted():
             self._put(Gap(channel, start, len(samples)), samples)
 
-    def take_all(self) -> list[Gap]:
-        """Ask for all that is not noted, in steps that fit the wire; the spans that did not come."""
+    def take_all(self, within: Span) -> list[Gap]:
+        """Ask for all of a stretch that is not noted, in steps that fit the wire; the spans that did not come."""
         missing: list[Gap] = []
-        size = CHUNK
-        for channel, had in enumerate(self._had, 1):
-            at = 0
-            while at < len(had):
-                if had[at]:
-                    at += int(np.argmin(had[at:])) if not had[at:].all() else len(had) - at
-                    continue
-                free = int(np.argmax(had[at:])) if had[at:].any() else len(had) - at
-                span = Gap(channel, at, min(size, free))
-                asked = time.monotonic()
-                if not self.take(span, TRIES):
-                    missing.append(span)
-                elif time.monotonic() - asked < SOON_S:
-                    size = min(2 * size, MOST)
-                at += span.count
+        for channel in range(1, len(self._had) + 1):
+            for start, stop in self._lacking(channel, within):
+                at = start
+                while at < stop:
+                    span = Gap(channel, at, min(self._size, stop - at))
+                    asked = time.monotonic()
+                    if not self.take(span, TRIES):
+                        missing.append(span)
+                        self._had[channel - 1][at : at + span.count] = True  # asked for again piece by piece, later
+                    elif time.monotonic() - asked < SOON_S:
+                        self._size = min(2 * self._size, MOST)
+                    at += span.count
         return missing
+
+    def _lacking(self, channel: int, within: Span) -> list[Span]:
+        """Stretches of a channel that were neither had nor asked for."""
+        had = self._had[channel - 1][within[0] : within[1]]
+        edges = np.flatnonzero(np.diff(np.concatenate([[True], had, [True]])))
+        return [(within[0] + int(a), within[0] + int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
     def take(self, span: Gap, tries: int) -> bool:
         """Whether the span was had from the recorder, while that holds the record."""
@@ -143,18 +169,17 @@ class _Reader:
         for attempt in range(tries):
             try:
                 if attempt:
-                    device.resynchronise()
-                samples = device.read(span.channel, span.start, span.count)
-                if len(samples) != span.count:
-                    raise BadReply(f"{len(samples)} samples came for {span.count}")
-                crc = device.crc(span.channel, span.start, span.count)
-                if crc32(samples) != crc:
+                    in_step(device)
+                chunk = device.chunk(span.channel, span.start, span.count)
+                if len(chunk.samples) != span.count:
+                    raise BadReply(f"{len(chunk.samples)} samples came for {span.count}")
+                if crc32(chunk.samples) != chunk.crc:
                     raise BadReply("the CRC-32 does not match")
-                if (held := device.status().held) != self._header.record_id:
+                if chunk.held != self._header.record_id:
                     # The CRC-32 was right, but of another record: nothing of it belongs here.
-                    raise BadReply(f"the recorder holds record {held} by now")
-                self._chunks.add(span.channel, span.start, samples, crc)
-                return samples
+                    raise BadReply(f"the recorder holds record {chunk.held} by now")
+                self._chunks.add(span.channel, span.start, chunk.samples, chunk.crc)
+                return chunk.samples
             except (LinkError, DeviceError) as e:
                 self.last = e
         return None
@@ -186,15 +211,41 @@ def _joined(gaps: list[Gap]) -> tuple[Gap, ...]:
     return tuple(out)
 
 
+def in_step(device: Device) -> None:
+    """Bring the wire back in step; a link that is gone is waited for.
+
+    Raises
+    ------
+    LinkError : it does not come back.
+    """
+    end = time.monotonic() + RECONNECT_S
+    while True:
+        try:
+            device.resynchronise()
+            return
+        except (NoReply, BadReply):
+            raise
+        except LinkError:
+            if time.monotonic() > end:
+                raise
+            time.sleep(0.1)
+
+
 def again(device: Device, call: Callable[[], T]) -> T:
     """A read that is tried again after the wire was brought back in step."""
     for attempt in range(TRIES):
+        last = attempt == TRIES - 1
         try:
             if attempt:
-                device.resynchronise()
+                in_step(device)
+        except (NoReply, BadReply):
+            if last:
+                raise
+            continue
+        try:
             return call()
         except LinkError:
-            if attempt == TRIES - 1:
+            if last:
                 raise
             time.sleep(0.1 * attempt)
     raise AssertionError("the last try returns or raises")

@@ -5,10 +5,11 @@ from typing import Any
 from daq.acquisition import settle
 from daq.chunks import Chunks
 from daq.errors import AcquisitionError, LinkError, StoreError
-from daq.finish import Emit, as_run, finish, release, save
+from daq.finish import Drop, Emit, as_run, finish, release, save
 from daq.journal import Journal
+from daq.ledger import FINGERPRINT
 from daq.readout import again, read_noted
-from daq.recorder import GateReading, Header
+from daq.recorder import Device, GateReading, Header
 from daq.rig import Rig
 from daq.run import new_run_id, now
 from daq.run_file import read_provenance
@@ -40,7 +41,12 @@ def recover(rig: Rig, rig_text: str, given: Test | None, store: Store, emit: Emi
             emit("nothing-held", recorder=rig.identity)
         journal.remove()
         return lost
-    found = _already_saved(store, rig.identity, header)
+    found = _already_saved(store, rig.identity, header, device)
+    if found is None and give_up and None in header.crcs:
+        emit("let-go", record_id=header.record_id, text="the record that the recorder shows is not kept, as asked")
+        release(device, header, emit)
+        journal.remove()
+        return lost
     if found is not None and (found[1] == 0 or give_up):
         emit("found-saved", run=found[0], record_id=header.record_id, missing=found[1])
         release(device, header, emit)
@@ -58,7 +64,9 @@ def recover(rig: Rig, rig_text: str, given: Test | None, store: Store, emit: Emi
     series = note.get("series") if ours else None
     emit("held", run=run, record_id=header.record_id)
     fewest = found[1] if found is not None else None
-    done = finish(rig, header, test[0], (rig_text, test[1]), run, series, now(), store, journal, emit, fewest)
+    passages = note.get("passages") if ours else None
+    drop = Drop(run, series, now(), test[0], (rig_text, test[1]), passages=passages)
+    done = finish(rig, header, drop, store, journal, emit, fewest)
     return done if done in store.runs() or found is None else found[0]
 
 
@@ -72,7 +80,7 @@ def _salvage(
     header = Header.from_json(record)
     if header == held or not _belongs(note, header):
         return None
-    found = _already_saved(store, rig.identity, header)
+    found = _already_saved(store, rig.identity, header, None)
     if found is not None:
         return found[0]
     chunks = journal.chunks(header)
@@ -84,8 +92,8 @@ def _salvage(
         chunks.close()
     test, text = _noted_test(note, journal)
     gate = GateReading(header.record_id, ())
-    texts, run, series = (rig_text, text), note["run"], note.get("series")
-    data = as_run(rig.file, rig.identity, header, readout, gate, test, texts, run, series, now())
+    drop = Drop(note["run"], note.get("series"), now(), test, (rig_text, text))
+    data = as_run(rig, header, readout, gate, drop)
     save(data, store, emit)
     emit(
         "partial",
@@ -105,8 +113,11 @@ def _belongs(note: dict[str, Any], header: Header) -> bool:
     return (note.get("boot"), note.get("record_id")) == (header.boot, header.record_id)
 
 
-def _already_saved(store: Store, identity: str, header: Header) -> tuple[str, int] | None:
-    """The run of this record that misses least, and how many samples it misses."""
+def _already_saved(store: Store, identity: str, header: Header, device: Device | None) -> tuple[str, int] | None:
+    """The run of this record that misses least, and how many samples it misses.
+
+    Where the recorder has no CRC its header is no proof: the first samples have to be those of the run as well.
+    """
     wanted = header.as_json()
     best: tuple[str, int] | None = None
     for run in reversed(store.runs()):
@@ -114,10 +125,17 @@ def _already_saved(store: Store, identity: str, header: Header) -> tuple[str, in
             facts = read_provenance(store.raw(run))
         except StoreError:
             continue  # a damaged run is no proof that the record is safe
-        if facts.get("recorder") == identity and facts.get("header") == wanted:
+        if facts.get("recorder") == identity and facts.get("header") == wanted and _begins(store, run, header, device):
             missing = int(facts.get("missing", 0))
             if best is None or missing < best[1]:
                 best = run, missing
             if missing == 0:
                 break
     return best
+
+
+def _begins(store: Store, run: str, header: Header, device: Device | None) -> bool:
+    if device is None or None not in header.crcs:
+        return True
+    first = again(device, lambda: device.chunk(1, 0, min(FINGERPRINT, header.points)).samples)
+    return bool((store.read(run).channels[0].samples[: len(first)] == first).all())

@@ -12,10 +12,14 @@ Driver = Literal["scpi", "modbus"]
 
 
 class Port(Table):
-    """A wire. `port` is a device path, `socket://host:port` or `rfc2217://…` (scpi), or `tcp://host:port` (modbus)."""
+    """A wire. `port` is a device path, `socket://host:port` or `rfc2217://…` (scpi), or `tcp://host:port` (modbus).
+
+    `profile`: what the device speaks, a shipped name or the path of one's own file (from the rig file's folder).
+    """
 
     driver: Driver
     port: str
+    profile: str = ""
     baud: Annotated[int, Field(gt=0)] = 115200
     unit_id: Annotated[int, Field(ge=1, le=247)] = 1
 
@@ -28,14 +32,23 @@ class Port(Table):
             raise ValueError(f"driver {self.driver!r} takes {wanted} as its port, not {self.port!r}")
         return self
 
+    @property
+    def profile_name(self) -> str:
+        """Name or path of the profile; by default that of the device protocol."""
+        return self.profile or f"droptower-{self.driver}"
+
 
 class Channel(Table):
-    """A channel of the recorder: value in `unit` = counts × counts_to_unit + offset."""
+    """A channel of the recorder: value in `unit` = counts × counts_to_unit + offset.
+
+    Of a recorder that says its own scale in volts it is volts × volts_to_unit + offset.
+    """
 
     name: str = "CH1"
     quantity: Literal["force", "acceleration", "displacement"] = "force"
     unit: str = "N"
-    counts_to_unit: Finite
+    counts_to_unit: Finite | None = None
+    volts_to_unit: Finite | None = None
     offset: Finite = 0.0
     range: Positive | None = None
     time_constant_s: Positive | None = None
@@ -43,10 +56,38 @@ class Channel(Table):
     certificate: str | None = None
 
     @model_validator(mode="after")
-    def _scale_is_not_zero(self) -> "Channel":
-        if self.counts_to_unit == 0:
-            raise ValueError("counts_to_unit is 0: every sample would be lost")
+    def _one_scale(self) -> "Channel":
+        if self.counts_to_unit is None and self.volts_to_unit is None:
+            raise ValueError("needs the key 'counts_to_unit' (or 'volts_to_unit', for a recorder that gives volts)")
+        for key in ("counts_to_unit", "volts_to_unit"):
+            if getattr(self, key) == 0:
+                raise ValueError(f"{key} is 0: every sample would be lost")
         return self
+
+    @property
+    def scale(self) -> float:
+        """Unit a count, as a run has it.
+
+        Raises
+        ------
+        ValueError : only a record's own header says it.
+        """
+        if self.counts_to_unit is None:
+            raise ValueError(f"channel {self.name} is scaled in volts; a count is known once there is a record")
+        return self.counts_to_unit
+
+    def in_volts(self, volts_a_count: float, volts_at_zero: float) -> "Channel":
+        """The channel with the scale that a recorder states of its record."""
+        assert self.volts_to_unit is not None, "a rig was checked for it"
+        scale, u = volts_a_count * self.volts_to_unit, self.u.get("volts_to_unit")
+        relative = None if u is None else abs(u / self.volts_to_unit)
+        return self.model_copy(
+            update={
+                "counts_to_unit": scale,
+                "offset": self.offset + volts_at_zero * self.volts_to_unit,
+                "u": self.u if relative is None else {**self.u, "counts_to_unit": relative * abs(scale)},
+            }
+        )
 
 
 class RecorderTable(Port):
@@ -119,4 +160,10 @@ def load_rig(path: Path) -> tuple[RigFile, str]:
     SettingsError : unknown or missing key, a value outside its limits, not TOML.
     """
     text = read_text(path)
-    return parse(text, RigFile, str(path)), text
+    rig = parse(text, RigFile, str(path))
+    own = {
+        name: port.model_copy(update={"profile": str(path.parent / port.profile)})
+        for name in ("recorder", "gate", "interlock")
+        if (port := getattr(rig, name)) is not None and port.profile.endswith(".toml")
+    }
+    return rig.model_copy(update=own), text

@@ -33,7 +33,7 @@ class ChannelData:
     def calibrated(self, part: slice | NDArray[np.int64] = slice(None)) -> NDArray[np.float64]:
         """Samples in the channel's unit, all or a part (slice, or indices (n,)); NaN in the gaps."""
         scale = self.calibration
-        values = np.asarray(self.samples[part], dtype=np.float64) * scale.counts_to_unit + scale.offset
+        values = np.asarray(self.samples[part], dtype=np.float64) * scale.scale + scale.offset
         if self.gaps:
             at = np.arange(len(self.samples))[part]
             for start, count in self.gaps:
@@ -43,7 +43,10 @@ class ChannelData:
 
 @dataclass(frozen=True)
 class RunData:
-    """Times in s; gate edges in ns against the trigger, which stands `-first_sample_ns` after the first sample."""
+    """Times in s; gate edges in ns against the trigger, which stands `-first_sample_ns` after the first sample.
+
+    gate_on_clock : False where only the time between two edges means anything
+    """
 
     run: str
     series: str | None
@@ -57,6 +60,7 @@ class RunData:
     g_source: str
     first_sample_ns: int | None = None
     gate_edges_ns: tuple[int, ...] = ()
+    gate_on_clock: bool = True
     rig: RigFile | None = None
     rig_text: str | None = None
     provenance: dict[str, Any] = field(default_factory=dict[str, Any])

@@ -51,7 +51,9 @@ def fill(f: h5py.File, run: RunData) -> h5py.Group:
     gate = group(instrument, "gate", "NXdetector")
     edges = gate.create_dataset("edges", data=np.asarray(run.gate_edges_ns, dtype=np.int64))
     edges.attrs["units"] = "ns"
-    _text(gate, "description", "flag edges against the trigger, falling first")
+    edges.attrs["on_recorder_clock"] = run.gate_on_clock
+    against = "against the trigger" if run.gate_on_clock else "on the gate's own clock"
+    _text(gate, "description", f"flag edges {against}, falling first")
     _write_sample(group(entry, "sample", "NXsample"), run)
     _note(entry, "test_file", run.test_text, "application/toml")
     _note(entry, "test", run.test.model_dump_json(by_alias=True, exclude_none=True), "application/json")
@@ -119,6 +121,7 @@ def _read(f: h5py.File, path: Path) -> RunData:
         g_source=facts.pop("g_source"),
         first_sample_ns=int(first["first_sample"][()]) if "first_sample" in first else None,
         gate_edges_ns=tuple(int(v) for v in instrument["gate/edges"][()]),
+        gate_on_clock=bool(instrument["gate/edges"].attrs.get("on_recorder_clock", True)),
         rig=None if rig is None else validate(json.loads(_string(rig)), RigFile, f"{path}: rig"),
         rig_text=None if rig is None else _string(entry["rig_file/data"]),
         provenance=facts,

@@ -1,6 +1,9 @@
-"""A byte stream to a device over pyserial: exact reads with deadlines from bytes and baud."""
+"""A byte stream to a device, a serial line by pyserial or a TCP socket: exact reads that end where nothing comes."""
 
+import contextlib
+import socket
 import time
+from typing import Protocol
 
 import serial
 
@@ -9,10 +12,70 @@ from daq.errors import LinkError, NoReply
 PROGRESS_LIMIT_S = 1.0
 """How long a reply may stand still before it is given up."""
 _QUIET_S = 0.05
+_MOST = 1 << 18
+
+
+class Stream(Protocol):
+    """Where bytes come from. Every call raises OSError or serial.SerialException when the link is gone."""
+
+    def write(self, data: bytes) -> None: ...
+    def read(self, wanted: int, patience_s: float) -> bytes:
+        """What has come, at least a byte, more if `wanted` allows; empty if nothing came in time."""
+        ...
+
+    def close(self) -> None: ...
+
+
+class _Line:
+    """A serial line, or what pyserial makes look like one."""
+
+    def __init__(self, port: str, baud: int) -> None:
+        self._serial = serial.serial_for_url(port, baudrate=baud, timeout=PROGRESS_LIMIT_S, write_timeout=5.0)
+
+    def write(self, data: bytes) -> None:
+        self._serial.write(data)
+
+    def read(self, wanted: int, patience_s: float) -> bytes:
+        waiting = self._serial.in_waiting
+        self._serial.timeout = patience_s
+        # An exact read of a large block is the fast way on a pty; what came before its time-out counts as progress.
+        return self._serial.read(max(waiting, min(wanted, 1 << 16)) if wanted > 1 else max(1, waiting))
+
+    def close(self) -> None:
+        with contextlib.suppress(OSError, serial.SerialException):
+            self._serial.close()
+
+
+class _Socket:
+    """Raw TCP; pyserial's own asks the system three times for each piece."""
+
+    def __init__(self, port: str) -> None:
+        host, _, number = port.removeprefix("socket://").rpartition(":")
+        if not host or not number.isdigit():
+            raise ValueError("it is not socket://host:port")
+        self._socket = socket.create_connection((host, int(number)), timeout=5.0)
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    def write(self, data: bytes) -> None:
+        self._socket.settimeout(5.0)
+        self._socket.sendall(data)
+
+    def read(self, wanted: int, patience_s: float) -> bytes:
+        self._socket.settimeout(patience_s)
+        try:
+            data = self._socket.recv(_MOST)
+        except TimeoutError:
+            return b""
+        if not data:
+            raise OSError("the device closed the connection")
+        return data
+
+    def close(self) -> None:
+        self._socket.close()
 
 
 class Wire:
-    """An open serial line or raw TCP socket.
+    """An open serial line (`rfc2217://` too) or raw TCP socket (`socket://host:port`).
 
     Raises
     ------
@@ -20,20 +83,33 @@ class Wire:
     """
 
     def __init__(self, port: str, baud: int) -> None:
-        self.port = port
+        self.port, self._baud = port, baud
         self._buffer = bytearray()
-        try:
-            self._serial = serial.serial_for_url(port, baudrate=baud, timeout=PROGRESS_LIMIT_S, write_timeout=5.0)
-        except (serial.SerialException, ValueError, OSError) as e:
-            raise LinkError(
-                f"port {port} cannot be opened: {e}; check the cable and the port in the rig file"
-            ) from None
+        self._stream: Stream | None = None
+        self._open()
+
+    def _open(self) -> Stream:
+        if self._stream is None:
+            try:
+                is_socket = self.port.startswith("socket://")
+                self._stream = _Socket(self.port) if is_socket else _Line(self.port, self._baud)
+            except (serial.SerialException, ValueError, OSError) as e:
+                raise LinkError(
+                    f"port {self.port} cannot be opened: {e}; check the cable and the port in the rig file"
+                ) from None
+        return self._stream
+
+    def _lost(self, doing: str, error: Exception) -> LinkError:
+        """The link is gone: the next use opens it anew."""
+        self.close()
+        return LinkError(f"port {self.port} failed while {doing}: {error}")
 
     def write(self, data: bytes) -> None:
+        stream = self._open()
         try:
-            self._serial.write(data)
+            stream.write(data)
         except (serial.SerialException, OSError) as e:
-            raise LinkError(f"port {self.port} failed while writing: {e}") from None
+            raise self._lost("writing", e) from None
 
     def read_exactly(self, size: int, first_byte_s: float = PROGRESS_LIMIT_S) -> bytes:
         """`size` bytes.
@@ -44,7 +120,7 @@ class Wire:
         """
         while len(self._buffer) < size:
             self._fill(size - len(self._buffer), first_byte_s if not self._buffer else PROGRESS_LIMIT_S, size)
-        taken = bytes(self._buffer[:size])
+        taken = bytes(memoryview(self._buffer)[:size])
         del self._buffer[:size]
         return taken
 
@@ -62,14 +138,12 @@ class Wire:
 
     def _fill(self, wanted: int, patience_s: float, total: int) -> None:
         """One read: what is wanted or what has come, at least a byte."""
+        stream = self._open()
         try:
-            waiting = self._serial.in_waiting
-            self._serial.timeout = patience_s
-            # An exact read of a large block is the fast way on a pty; what came before its time-out counts as progress.
-            data = self._serial.read(max(waiting, min(wanted, 1 << 16)) if wanted > 1 else max(1, waiting))
+            data = stream.read(wanted, patience_s)
         except (serial.SerialException, OSError, TypeError) as e:
             # pyserial raises TypeError when another thread or a vanished device has closed the descriptor.
-            raise LinkError(f"port {self.port} failed while reading: {e}") from None
+            raise self._lost("reading", e) from None
         if not data:
             raise NoReply(
                 f"port {self.port}: no reply for {patience_s:g} s, {len(self._buffer)} of {total} bytes had come"
@@ -86,15 +160,18 @@ class Wire:
         dropped = len(self._buffer)
         self._buffer.clear()
         end = time.monotonic() + at_most_s
+        stream = self._open()
         try:
-            self._serial.timeout = _QUIET_S
-            while data := self._serial.read(4096):
+            while data := stream.read(4096, _QUIET_S):
                 dropped += len(data)
                 if time.monotonic() > end:
                     raise NoReply(f"port {self.port} does not fall silent: {dropped} bytes in {at_most_s:g} s")
-        except (serial.SerialException, OSError) as e:
-            raise LinkError(f"port {self.port} failed while reading: {e}") from None
+        except (serial.SerialException, OSError, TypeError) as e:
+            raise self._lost("reading", e) from None
         return dropped
 
     def close(self) -> None:
-        self._serial.close()
+        self._buffer.clear()
+        if self._stream is not None:
+            self._stream.close()
+            self._stream = None

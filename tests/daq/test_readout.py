@@ -57,7 +57,7 @@ def test_a_killed_host_goes_on_where_it_stopped(wire: str, slow: Emulator, tmp_p
     reading = next(e for e in again.events if e["event"] == "reading")
     assert reading["noted"] == 2 * CHUNK, "so much need not be read again"
     progress = [e["done"] for e in again.events if e["event"] == "progress"]
-    assert progress[:2] == [CHUNK, 2 * CHUNK]
+    assert progress[0] == 3 * CHUNK, "from there on"
     assert progress == sorted(progress)
     assert progress[-1] == 100_000
     assert Store(data).read(run).missing == 0
