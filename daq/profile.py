@@ -1,7 +1,6 @@
 """Profiles: what a device says and understands, as TOML, so that foreign gear needs no code (docs/profiles.md)."""
 
 import re
-from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -11,7 +10,7 @@ from daq.errors import SettingsError
 from daq.template import places
 from daq.toml_file import parse, read_text
 
-SHIPPED = files("daq") / "profiles"
+SHIPPED = Path(__file__).parent / "profiles"
 _TIMES = {"interval_s", "interval_ns", "rate_Hz", "delay_s", "delay_ns"}
 READ_BACK = _TIMES | {"points", "pretrigger", "level", "source", "slope"}
 SETTINGS = READ_BACK | {"pretrigger_s", "window_s", "center_s"}

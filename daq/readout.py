@@ -116,7 +116,7 @@ class _Reader:
     def __init__(self, device: Device | None, header: Header, chunks: Chunks, progress: Progress) -> None:
         self._device, self._header, self._chunks, self._progress = device, header, chunks, progress
         self.channels = [np.zeros(header.points, dtype=np.int16) for _ in header.crcs]
-        self._had = [np.zeros(header.points, dtype=np.bool_) for _ in header.crcs]
+        self._asked: list[list[Span]] = [[] for _ in header.crcs]
         self._size = CHUNK
         self.done = 0
         self.held = device is not None
@@ -127,15 +127,15 @@ class _Reader:
     def take_all(self, within: Span) -> list[Gap]:
         """Ask for all of a stretch that is not noted, in steps that fit the wire; the spans that did not come."""
         missing: list[Gap] = []
-        for channel in range(1, len(self._had) + 1):
+        for channel in range(1, len(self._asked) + 1):
             for start, stop in self._lacking(channel, within):
                 at = start
                 while at < stop:
                     span = Gap(channel, at, min(self._size, stop - at))
                     asked = time.monotonic()
                     if not self.take(span, TRIES):
-                        missing.append(span)
-                        self._had[channel - 1][at : at + span.count] = True  # asked for again piece by piece, later
+                        missing.append(span)  # asked for again piece by piece, later
+                        self._asked[channel - 1].append((at, at + span.count))
                     elif time.monotonic() - asked < SOON_S:
                         self._size = min(2 * self._size, MOST)
                     at += span.count
@@ -143,9 +143,13 @@ class _Reader:
 
     def _lacking(self, channel: int, within: Span) -> list[Span]:
         """Stretches of a channel that were neither had nor asked for."""
-        had = self._had[channel - 1][within[0] : within[1]]
-        edges = np.flatnonzero(np.diff(np.concatenate([[True], had, [True]])))
-        return [(within[0] + int(a), within[0] + int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+        lacking: list[Span] = []
+        at, stop = within
+        for start, end in sorted(self._asked[channel - 1]):
+            if at < min(start, stop):
+                lacking.append((at, min(start, stop)))
+            at = max(at, end)
+        return [*lacking, (at, stop)] if at < stop else lacking
 
     def take(self, span: Gap, tries: int) -> bool:
         """Whether the span was had from the recorder, while that holds the record."""
@@ -161,7 +165,7 @@ class _Reader:
     def _put(self, span: Gap, samples: Counts) -> None:
         part = slice(span.start, span.start + span.count)
         self.channels[span.channel - 1][part] = samples
-        self._had[span.channel - 1][part] = True
+        self._asked[span.channel - 1].append((span.start, span.start + span.count))
         self.done += span.count
         self._progress(self.done, self._header.points * len(self._header.crcs))
 

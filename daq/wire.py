@@ -1,6 +1,8 @@
 """A byte stream to a device, a serial line by pyserial or a TCP socket: exact reads that end where nothing comes."""
 
 import contextlib
+import os
+import select
 import socket
 import time
 from typing import Protocol
@@ -31,15 +33,24 @@ class _Line:
 
     def __init__(self, port: str, baud: int) -> None:
         self._serial = serial.serial_for_url(port, baudrate=baud, timeout=PROGRESS_LIMIT_S, write_timeout=5.0)
+        # A line of the system's own, opened not to block; `rfc2217://` has none.
+        self._fd: int | None = None if "://" in port else self._serial.fileno()
 
     def write(self, data: bytes) -> None:
         self._serial.write(data)
 
     def read(self, wanted: int, patience_s: float) -> bytes:
-        waiting = self._serial.in_waiting
-        self._serial.timeout = patience_s
-        # An exact read of a large block is the fast way on a pty; what came before its time-out counts as progress.
-        return self._serial.read(max(waiting, min(wanted, 1 << 16)) if wanted > 1 else max(1, waiting))
+        if self._fd is None:
+            self._serial.timeout = patience_s
+            return self._serial.read(max(1, min(wanted, self._serial.in_waiting)))
+        # pyserial asks the system whether there is something before each read; here only after one that gave nothing.
+        if data := os.read(self._fd, _MOST):
+            return data
+        if not select.select([self._fd], [], [], patience_s)[0]:
+            return b""
+        if data := os.read(self._fd, _MOST):
+            return data
+        raise OSError("the device is gone")
 
     def close(self) -> None:
         with contextlib.suppress(OSError, serial.SerialException):

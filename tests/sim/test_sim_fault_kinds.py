@@ -266,7 +266,7 @@ def test_a_wrong_clock_puts_the_samples_further_apart(shared_emulator: Emulator,
     assert header(scpi)[4] == 1000
     width = [int((samples > 300).sum()) for samples in (right, slow)]
     assert width[0] / width[1] == pytest.approx(2, rel=0.02)
-    assert [crossing(slow), crossing(right)] == pytest.approx([500, 500], abs=2), "noise may cross a sample later"
+    assert [crossing(slow), crossing(right)] == pytest.approx([500, 500], abs=10), "noise may cross a sample later"
 
 
 def test_triggers_come_without_a_drop_early_or_twice(shared_emulator: Emulator, scpi: Scpi):
