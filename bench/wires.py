@@ -203,12 +203,12 @@ def scpi_unpaced(tries: int) -> None:
         hold(emulator, samples)
         pty, tcp = emulator.endpoints["scpi_pty"], emulator.endpoints["scpi_tcp"]
         device: Device = scpi_device(pty, 921600)
-        ratio("SCPI, pty without pace, 1,000,000 samples", 0.6, bare_line(pty, samples), whole(device), tries)
+        ratio("SCPI, pty without pace, 1,000,000 samples", 0.6, bare_line(pty, samples), whole(device), 3 * tries)
         device.close()
         device = scpi_device(tcp, 921600)
-        ratio("SCPI, TCP, 1,000,000 samples", 0.5, bare_tcp(tcp, samples), whole(device), tries)
+        ratio("SCPI, TCP, 1,000,000 samples", 0.5, bare_tcp(tcp, samples), whole(device), 3 * tries)
         promised = promised_tcp(tcp, samples)
-        ratio("the same against a loop that keeps, checks and notes, each step bare", 0, promised, whole(device), tries)
+        ratio("the same against a loop that keeps, checks and notes, each step bare", 0, promised, whole(device), 3 * tries)
         device.close()
 
 

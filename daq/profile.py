@@ -81,22 +81,26 @@ class ScpiStatus(Part):
 
 
 class ScpiHeader(Part):
-    """What the recorder says of its record; `commands` go out before, once a channel."""
+    """What the recorder says of its record; `commands` go out before, once a channel.
+
+    bits, interval_ns, first_ns : what it does not say and always is so
+    """
 
     query: str
     fields: list[str]
     commands: list[str] = Field(default_factory=list[str])
     bits: Annotated[int, Field(ge=4, le=16)] | None = None
+    interval_ns: Annotated[int, Field(gt=0)] | None = None
+    first_ns: int | None = None
 
     @model_validator(mode="after")
     def _enough(self) -> "ScpiHeader":
         if unknown := set(self.fields) - SCPI_HEADER:
             raise ValueError(f"field {sorted(unknown)[0]!r} is not known; known are {', '.join(sorted(SCPI_HEADER))}")
-        for needed in (("points",), ("interval_ns", "x_increment_s"), ("first_ns", "x_origin_s")):
-            if not set(needed) & set(self.fields):
-                raise ValueError(f"needs the field {' or '.join(needed)}")
-        if "bits" not in self.fields and self.bits is None:
-            raise ValueError("needs the field bits, or the key bits")
+        told = set(self.fields) | {key for key in ("bits", "interval_ns", "first_ns") if getattr(self, key) is not None}
+        for needed in (("points",), ("interval_ns", "x_increment_s"), ("first_ns", "x_origin_s"), ("bits",)):
+            if not set(needed) & told:
+                raise ValueError(f"needs the field {' or '.join(needed)}; what the recorder does not say is a key here")
         _check("commands", [*self.commands, self.query], {"channel"})
         return self
 

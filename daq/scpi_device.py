@@ -168,8 +168,8 @@ class ScpiDevice:
             raise BadReply(
                 f"{self._scpi.wire.port}: the channels have {[t['points'] for t in told]} points, not as many"
             )
-        interval = first.get("interval_ns", first.get("x_increment_s", 0) * 1e9)
-        start = first.get("first_ns", first.get("x_origin_s", 0) * 1e9)
+        interval = first.get("interval_ns", first.get("x_increment_s", 0) * 1e9) or self._header.interval_ns or 0
+        start = first.get("first_ns", first.get("x_origin_s", 0) * 1e9) or self._header.first_ns or 0
         crcs = [int(first[f"crc{n}"]) for n in range(len(first)) if f"crc{n}" in first]
         middle = {"u8": 1 << 7, "u16": 1 << 15}.get(self._data.type, 0)
         scales = tuple(
