@@ -25,7 +25,7 @@ def answer_of(store: Store, run: str) -> dict[str, Any]:
     kept = store.analysis(run)
     if kept is not None and {k: kept.get(k) for k in made_by} == made_by:
         return kept
-    answer = {**_analysed(store.read(run)), **made_by}
+    answer = {**analysed(store.read(run)), **made_by}
     try:
         store.add_analysis(run, answer)
     except StoreError as e:
@@ -34,7 +34,8 @@ def answer_of(store: Store, run: str) -> dict[str, Any]:
     return answer
 
 
-def _analysed(run: RunData) -> dict[str, Any]:
+def analysed(run: RunData) -> dict[str, Any]:
+    """What the record of a run says; a failure of the analysis is a warning in it."""
     head = {"run": run.run, "series": run.series}
     settings = {"g": run.g, "g_source": run.g_source}
     try:
@@ -54,6 +55,7 @@ def _analysed(run: RunData) -> dict[str, Any]:
             f"{run.missing} samples could not be had; the findings are those of the stretch around the greatest force"
         )
         found["warnings"].insert(0, {"code": "partial-record", "text": text})
+    found["warnings"] += run.provenance.get("told", [])
     return {**head, "findings": found["findings"], "fit": None, "warnings": found["warnings"], "settings": settings}
 
 

@@ -11,6 +11,7 @@ from rich.table import Table
 from api.answer import answer_of
 from api.commands.live import follow
 from api.commands.show import value_with_u
+from api.early import start
 from api.process import Acquisition, Emulator, ProcessError
 from daq.store import Store
 
@@ -34,7 +35,7 @@ mass_kg = 0.503
 tip_radius_mm = 6.35
 
 [specimen]
-id = "CR-39 {v0:.2f} m/s"
+id = "CR-39 no. {number}"
 material = "CR-39"
 thickness_mm = 4.6
 nu = 0.30
@@ -89,10 +90,10 @@ def run_demo(data: Path) -> bool:
             for v0, (specimen, _, _) in DROPS.items():
                 console.print(f"CR-39 at {v0:.2f} m/s by {driver.upper()} on {rig.endpoints[wire]}", highlight=False)
                 test_file = data / f"demo-test-{v0:.2f}.toml"
-                test_file.write_text(TEST_FILE.format(v0=v0))
+                test_file.write_text(TEST_FILE.format(number=len(store.runs()) + 1))
                 hand.ask(do="specimen", **dict(zip(("E_GPa", "C_i", "C_d"), specimen, strict=True)))
                 hand.ask(do="height", v0=v0)
-                acquisition = Acquisition("acquire", rig_file, data, test_file, "demo CR-39")
+                acquisition = start(rig_file, test_file, data, "demo CR-39")
                 truth = _drop(acquisition, hand)
                 end = follow(acquisition, as_json=False)
                 if end["event"] != "done":

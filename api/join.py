@@ -73,7 +73,7 @@ def impact_of(run: RunData) -> Impact:
         height=None if test.drop.height_mm is None else test.drop.height_mm * 1e-3,
         u_height=_scaled(test.drop, "height_mm", 1e-3),
         g=run.g,
-        catcher=test.drop.catcher or (rig is not None and rig.tower.catcher),
+        catcher=test.drop.catcher or run.provenance.get("catcher", rig is not None and rig.tower.catcher),
         friction=rig.tower.friction_N if rig is not None else 0.0,
         gate=None
         if gate is None

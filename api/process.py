@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,8 @@ class ProcessError(DaqError):
 class Acquisition:
     """A running `python -m daq`, in a session of its own: it outlives whoever started it.
 
-    `events` holds what it has said so far; iterating follows it to its end, from the first event on.
+    `events` holds what it has said so far; iterating follows it to its end, from the first event on. `at_window` makes
+    an event of the contact window, once that has been read.
     """
 
     def __init__(
@@ -33,12 +34,22 @@ class Acquisition:
         test: Path | None = None,
         series: str | None = None,
         give_up: bool = False,
+        first: tuple[int, int] | None = None,
+        spare: Path | None = None,
+        again: bool = False,
+        at_window: Callable[[Event], Event] | None = None,
+        more: list[str] | None = None,
     ) -> None:
         command = [sys.executable, "-m", "daq", do, "--rig", str(rig)]
         command += ["--data", str(data)] if data is not None else []
         command += ["--test", str(test)] if test is not None else []
         command += [f"--series={series}"] if series is not None else []
         command += ["--give-up"] if give_up else []
+        command += ["--first", f"{first[0]}:{first[1]}"] if first is not None else []
+        command += ["--spare", str(spare)] if spare is not None else []
+        command += ["--again"] if again else []
+        command += more or []
+        self._at_window = at_window
         self.events: list[Event] = []
         self._news = threading.Condition()
         self._ended = False
@@ -56,7 +67,10 @@ class Acquisition:
         reader = threading.Thread(target=lambda: words.append(err.read()), daemon=True)
         reader.start()
         for line in out:
-            self._add(json.loads(line))
+            event = json.loads(line)
+            self._add(event)
+            if event["event"] == "window" and self._at_window is not None:
+                self._look(event, self._at_window)
         code = self._process.wait()
         reader.join()
         out.close()
@@ -68,6 +82,13 @@ class Acquisition:
         with self._news:
             self._ended = True
             self._news.notify_all()
+
+    def _look(self, event: Event, at_window: Callable[[Event], Event]) -> None:
+        """What the contact shows, as an event of its own. It may fail: the run's own analysis comes later."""
+        try:
+            self._add(at_window(event))
+        except Exception as e:  # whatever it is, the drop goes on
+            self._add({"event": "no-preliminary", "text": f"the contact could not be looked at yet: {e}"})
 
     def _add(self, event: Event) -> None:
         with self._news:

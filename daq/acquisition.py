@@ -6,13 +6,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from daq.before import look
 from daq.errors import AcquisitionError, DeviceError, LinkError, NoReply
 from daq.finish import Drop, Emit, finish
 from daq.journal import Journal
+from daq.quiet import let_go
 from daq.readout import Span, again
 from daq.recorder import Condition, Device, GateReading, Header, Interlock, Settings, Status
 from daq.rig import Rig, wanted_settings
 from daq.run import new_run_id, now
+from daq.specimen import refuse_used
 from daq.store import Store
 from daq.test_file import TestFile
 
@@ -31,21 +34,27 @@ def acquire(
     stop: Callable[[], bool],
     first: Span | None = None,
     spare: Store | None = None,
+    hit_again: bool = False,
 ) -> str:
     """Take one drop into the store; its run id. `texts` are those of the rig and the test file.
 
     first : samples of the record that are read before the rest; spare : where a run goes that the store does not take
+    hit_again : a specimen that was hit before is hit again
 
     Raises
     ------
-    AcquisitionError : no trigger, interlock, aborted, a record that is held or stale, a run that could not be written.
+    AcquisitionError : no trigger, interlock, catcher, aborted, a specimen that was hit before, a record that is held
+        or stale, a run that could not be written.
     LinkError, DeviceError, StoreError : as they say; what the recorder holds it still holds.
     """
     device, file = rig.recorder, rig.file
     wanted = wanted_settings(file, rig.profile)
     emit("connected", recorder=rig.identity, port=file.recorder.port)
-    _refuse_held(settle(device, emit))
+    _refuse_held(let_go(device, wanted, settle(device, emit), emit))
+    if not hit_again:
+        refuse_used(store, texts[1])
     store.check_writable(2 * wanted.points * len(file.recorder.channel) + 1_000_000)
+    notes = look(rig, test, wanted, store, emit)
     _configure(device, wanted)
     emit("configured", sample_rate_Hz=1e9 / wanted.interval_ns, samples=wanted.points, pretrigger=wanted.pretrigger)
     _await_interlock(rig, stop, emit)
@@ -53,12 +62,12 @@ def acquire(
     journal = Journal(store.folder, rig.identity)
     counter = Counter.of(rig)
     note = {"run": run, "series": series, "rig_text": texts[0], "test_text": texts[1], "passages": counter.before}
-    note |= {"test": test.model_dump(mode="json", by_alias=True, exclude_none=True), "noted_at": now()}
+    note |= {"notes": notes, "test": test.model_dump(mode="json", by_alias=True, exclude_none=True), "noted_at": now()}
     armed = _arm(device, wanted, journal, note, emit)
     if not _wait(device, armed, wanted, file.recorder.wait_s, stop, counter, emit):
         journal.remove()
         raise AcquisitionError("aborted", "disarmed as asked; no drop was recorded")
-    drop = Drop(run, series, now(), test, texts, first, spare, counter.before, counter.reading)
+    drop = Drop(run, series, now(), test, texts, first, spare, counter.before, counter.reading, notes)
     header = again(device, device.header)
     _check_header(header, armed, wanted, emit)
     return finish(rig, header, drop, store, journal, emit)

@@ -1,21 +1,19 @@
 """Is the rig ready? Identity, settings, interlock, gate, noise and link speed, before any specimen is there."""
 
-import time
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
 from daq.acquisition import settle
 from daq.errors import AcquisitionError, DeviceError, LinkError
-from daq.finish import POLL_S, Emit
+from daq.finish import Emit
 from daq.profile import ScpiProfile
+from daq.quiet import for_a_check, let_go, take
 from daq.readout import again
-from daq.recorder import Condition, Counts, Device, Header, Interlock, Settings
+from daq.recorder import Counts, Device, Header, Interlock, Settings
 from daq.rig import Rig, wanted_settings
 from daq.rig_file import RigFile
 
-NOISE_POINTS = 20_000
-"""Samples that noise and speed are measured on: four seconds of a line at 115,200 baud."""
 CLEAR_OF_NOISE = 6.0
 """Standard deviations that the trigger level has to stand off the zero level: nearer, noise triggers within minutes."""
 SLOW = 0.5
@@ -40,13 +38,12 @@ def check(rig: Rig, emit: Emit) -> bool:
     LinkError, DeviceError : the recorder does not answer.
     """
     device = rig.recorder
-    status = settle(device, emit)
-    if status.held:
-        raise AcquisitionError("held", f"the recorder holds record {status.held}; `droptower recover` saves it first")
+    wanted = wanted_settings(rig.file, rig.profile)
+    free_recorder(rig, emit)
     rows = [
         Check("identity", True, rig.identity),
         *_abilities(rig),
-        settings := _settings(device, wanted_settings(rig.file, rig.profile)),
+        settings := _settings(device, wanted),
         *_interlock(rig),
         *_gate(rig),
     ]
@@ -55,6 +52,19 @@ def check(rig: Rig, emit: Emit) -> bool:
     for row in rows:
         emit("check", **asdict(row))
     return all(row.ok for row in rows)
+
+
+def free_recorder(rig: Rig, emit: Emit) -> None:
+    """Bring the recorder to rest and let go what a check left.
+
+    Raises
+    ------
+    AcquisitionError : it holds a record that was never saved; that is left alone.
+    """
+    device = rig.recorder
+    status = let_go(device, wanted_settings(rig.file, rig.profile), settle(device, emit), emit)
+    if status.held:
+        raise AcquisitionError("held", f"the recorder holds record {status.held}; `droptower recover` saves it first")
 
 
 def _abilities(rig: Rig) -> list[Check]:
@@ -107,24 +117,13 @@ def _gate(rig: Rig) -> list[Check]:
 
 def _quiet_record(device: Device, rig: Rig) -> list[Check]:
     """A record of nothing, triggered at once and let go again: noise, zero level, pre-trigger and link speed."""
-    file = rig.file
-    wanted = wanted_settings(file, rig.profile)
-    points = max(wanted.pretrigger + 1, min(wanted.points, NOISE_POINTS))
-    quiet = replace(wanted, source="IMM", points=points)
-    device.configure(quiet)
-    device.arm()
-    end = time.monotonic() + 2 * points * quiet.interval_ns * 1e-9 + 5.0
-    while not again(device, device.status).condition & Condition.HELD:
-        if time.monotonic() > end:
-            device.abort()
-            return [Check("record", False, "a record triggered at once does not come to its end")]
-        time.sleep(POLL_S)
-    header = again(device, device.header)
-    started = time.monotonic()
-    samples = again(device, lambda: device.chunk(1, 0, points)).samples
-    took = time.monotonic() - started
-    device.acknowledge(header.record_id, header.crcs[0] or 0)
-    return [_pretrigger(header, quiet), _noise(samples, quiet, file), _speed(2 * points / took, file)]
+    quiet = for_a_check(wanted_settings(rig.file, rig.profile))
+    try:
+        header, samples, took = take(device, quiet)
+    except DeviceError as e:
+        return [Check("record", False, str(e))]
+    rows = [_pretrigger(header, quiet), _noise(samples[0], quiet, rig.file)]
+    return [*rows, _speed(2 * header.points / took, rig.file)]
 
 
 def _pretrigger(header: Header, asked: Settings) -> Check:

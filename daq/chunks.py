@@ -11,9 +11,26 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from daq.errors import StoreError
 from daq.recorder import Counts, crc32
 
 _HEAD = struct.Struct("<IIII")
+Noted = dict[tuple[int, int], Counts]
+"""Chunks by channel and first sample."""
+
+
+def _whole_chunks(content: bytes, at: int) -> tuple[Noted, int]:
+    """Chunks from byte `at` on up to the first that is cut off or damaged, and where that begins."""
+    noted: Noted = {}
+    while at + _HEAD.size <= len(content):
+        channel, start, count, crc = _HEAD.unpack_from(content, at)
+        end = at + _HEAD.size + 2 * count
+        samples = np.frombuffer(content[at + _HEAD.size : end], dtype="<i2").astype(np.int16)
+        if len(samples) != count or crc32(samples) != crc:
+            break
+        noted[channel, start] = samples
+        at = end
+    return noted, at
 
 
 class Chunks:
@@ -24,7 +41,7 @@ class Chunks:
 
     def __init__(self, path: Path, record: dict[str, Any]) -> None:
         self.path = path
-        self._noted: dict[tuple[int, int], Counts] = {}
+        self._noted: Noted = {}
         title = json.dumps(record, sort_keys=True).encode() + b"\n"
         self._file: BinaryIO | None = None
         try:
@@ -42,16 +59,23 @@ class Chunks:
         """Bytes of `content` that are whole chunks of this record."""
         if not content.startswith(title):
             return 0
-        at = len(title)
-        while at + _HEAD.size <= len(content):
-            channel, start, count, crc = _HEAD.unpack_from(content, at)
-            end = at + _HEAD.size + 2 * count
-            samples = np.frombuffer(content[at + _HEAD.size : end], dtype="<i2").astype(np.int16)
-            if len(samples) != count or crc32(samples) != crc:
-                break
-            self._noted[channel, start] = samples
-            at = end
-        return at
+        self._noted, kept = _whole_chunks(content, len(title))
+        return kept
+
+    @staticmethod
+    def look(path: Path) -> tuple[dict[str, Any], Noted]:
+        """The record that the chunks at `path` belong to, and those that are whole, while somebody else notes more.
+
+        Raises
+        ------
+        StoreError : there are none.
+        """
+        try:
+            content = path.read_bytes()
+            title, _, _ = content.partition(b"\n")
+            return json.loads(title), _whole_chunks(content, len(title) + 1)[0]
+        except (OSError, ValueError) as e:
+            raise StoreError(f"what was read of the record cannot be looked at in {path}: {e}") from None
 
     @staticmethod
     def record_in(path: Path) -> dict[str, Any] | None:

@@ -55,9 +55,10 @@ def finish(
     emit("reading", run=run, samples=header.points * len(header.crcs), noted=noted)
 
     def window_read() -> None:
-        emit(
-            "window", run=run, start=(drop.first or (0, 0))[0], stop=(drop.first or (0, 0))[1], chunks=str(chunks.path)
-        )
+        assert drop.first is not None, "a window was read"
+        start, stop = drop.first
+        edges = _edges_so_far(rig, header, drop)
+        emit("window", run=run, start=start, stop=stop, chunks=str(chunks.path), gate_edges_ns=edges)
 
     try:
         readout = read_record(device, header, chunks, Pace(run, noted, emit), drop.first, window_read)
@@ -177,6 +178,17 @@ def _read_gate(rig: Rig, header: Header, drop: Drop, emit: Emit) -> GateReading:
         emit("gate-silent", text="the gate saw nothing of this drop")
         return none
     return reading
+
+
+def _edges_so_far(rig: Rig, header: Header, drop: Drop) -> list[int]:
+    """What the gate has of this drop by now, in step with the record's clock; none if it does not say."""
+    if rig.gate is None or drop.passages is not None:
+        return []
+    try:
+        reading = rig.gate.gate()
+    except (LinkError, DeviceError):
+        return []  # told when it is read for the run
+    return list(reading.edges_ns) if reading.record_id == header.record_id else []
 
 
 def _counted(reading: GateReading, drop: Drop, emit: Emit) -> GateReading | None:

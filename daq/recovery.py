@@ -8,9 +8,10 @@ from daq.errors import AcquisitionError, LinkError, StoreError
 from daq.finish import Drop, Emit, as_run, finish, release, save
 from daq.journal import Journal
 from daq.ledger import FINGERPRINT
+from daq.quiet import let_go
 from daq.readout import again, read_noted
 from daq.recorder import Device, GateReading, Header
-from daq.rig import Rig
+from daq.rig import Rig, wanted_settings
 from daq.run import new_run_id, now
 from daq.run_file import read_provenance
 from daq.store import Store
@@ -33,7 +34,7 @@ def recover(rig: Rig, rig_text: str, given: Test | None, store: Store, emit: Emi
     device = rig.recorder
     journal = Journal(store.folder, rig.identity)
     note = journal.read() or {}
-    status = settle(device, emit)
+    status = let_go(device, wanted_settings(rig.file, rig.profile), settle(device, emit), emit)
     header = again(device, device.header) if status.held else None
     lost = _salvage(rig, rig_text, note, header, journal, store, emit)
     if header is None:
@@ -65,7 +66,8 @@ def recover(rig: Rig, rig_text: str, given: Test | None, store: Store, emit: Emi
     emit("held", run=run, record_id=header.record_id)
     fewest = found[1] if found is not None else None
     passages = note.get("passages") if ours else None
-    drop = Drop(run, series, now(), test[0], (rig_text, test[1]), passages=passages)
+    notes = note.get("notes", {}) if ours else {}
+    drop = Drop(run, series, now(), test[0], (rig_text, test[1]), passages=passages, notes=notes)
     done = finish(rig, header, drop, store, journal, emit, fewest)
     return done if done in store.runs() or found is None else found[0]
 
@@ -92,7 +94,7 @@ def _salvage(
         chunks.close()
     test, text = _noted_test(note, journal)
     gate = GateReading(header.record_id, ())
-    drop = Drop(note["run"], note.get("series"), now(), test, (rig_text, text))
+    drop = Drop(note["run"], note.get("series"), now(), test, (rig_text, text), notes=note.get("notes", {}))
     data = as_run(rig, header, readout, gate, drop)
     save(data, store, emit)
     emit(

@@ -1,5 +1,6 @@
 """The rig file: recorder, gate and interlock, each with driver, port and settings."""
 
+from datetime import date
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -53,7 +54,17 @@ class Channel(Table):
     range: Positive | None = None
     time_constant_s: Positive | None = None
     calibrated_on: str | None = None
+    calibration_due: str | None = None
     certificate: str | None = None
+
+    @model_validator(mode="after")
+    def _dates(self) -> "Channel":
+        if self.calibration_due is not None:
+            try:
+                date.fromisoformat(self.calibration_due)
+            except ValueError:
+                raise ValueError(f'calibration_due is a date like "2027-05-01", not {self.calibration_due!r}') from None
+        return self
 
     @model_validator(mode="after")
     def _one_scale(self) -> "Channel":

@@ -41,6 +41,7 @@ class Control:
             "catcher": lambda keys: self._switch("catcher", "on", keys),
             "door": lambda keys: self._switch("door_open", "open", keys),
             "release": self._release,
+            "tap": self._tap,
             "fault": self._fault,
             "clear": self._clear,
             "status": self._status,
@@ -88,6 +89,14 @@ class Control:
         _none(keys)
         number, truth = await self._tower.release()
         return {"drop": number, "truth": truth}
+
+    def _tap(self, keys: Answer) -> Answer:
+        peak = keys.pop("peak_N", 100)
+        _none(keys)
+        if isinstance(peak, bool) or not isinstance(peak, int | float) or not 1 <= abs(peak) <= 1e5:
+            raise SettingError(f"peak_N must be 1 to 1e5 in magnitude, not {peak!r}")
+        self._tower.tap(peak)
+        return {}
 
     def _fault(self, keys: Answer) -> Answer:
         fault = set_fault(self._device.faults, keys)

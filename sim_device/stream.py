@@ -61,7 +61,7 @@ class Drop:
         self.number, self.rig, self.motion, self.phase = number, rig, motion, phase
         self.release = release
         self.contact = release + motion.t_fall * 1e9
-        self._key = (seed, 2, number)
+        self._key = (seed, 2 if number >= 0 else 4, abs(number))
 
     def snap(self, origin: float, interval_ns: int) -> None:
         """Move the contact, by less than an interval, to its phase on a grid that runs already."""

@@ -16,6 +16,7 @@ from sim_device.faults import Faults
 from sim_device.recorder import Recorder
 from sim_device.settings import Rig, SettingError
 from sim_device.stream import Drop
+from sim_device.tap import Tap
 
 
 class Refused(Exception):
@@ -35,6 +36,7 @@ class Tower:
         self._faults, self._seed, self._log = faults, seed, log
         self._drop: Drop | None = None
         self._preparing = False
+        self._taps = 0
 
     @property
     def moving(self) -> bool:
@@ -75,6 +77,21 @@ class Tower:
             return number, self.last_truth
         finally:
             self._preparing = False
+
+    def tap(self, peak_N: float) -> None:
+        """A tap on the tup of the dart in its clamp.
+
+        Raises
+        ------
+        Refused
+            A dart that is not in its clamp.
+        """
+        if self.moving or self._preparing:
+            raise Refused("the dart is not in its clamp: the last drop is not over")
+        if self.recorder is not None:
+            self._taps += 1
+            now = float(time.monotonic_ns())
+            self.recorder.released(Drop(-self._taps, self.rig, Tap(self.rig, peak_N), now, 0.5, self._seed))
 
     def _schedule(self, drop: Drop, edges: list[gate.Edge]) -> None:
         loop = asyncio.get_running_loop()

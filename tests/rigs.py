@@ -62,9 +62,10 @@ def write_test(folder: Path) -> Path:
 
 
 class Daq:
-    """`python -m daq`, followed event by event."""
+    """`python -m daq`, followed event by event. `again`: the specimen may have been hit before."""
 
-    def __init__(self, do: str, rig: Path, data: Path, *arguments: str) -> None:
+    def __init__(self, do: str, rig: Path, data: Path, *arguments: str, again: bool = True) -> None:
+        arguments += ("--again",) if do == "acquire" and again else ()
         command = [sys.executable, "-m", "daq", do, "--rig", str(rig), "--data", str(data), *arguments]
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         self.events: list[dict[str, Any]] = []

@@ -7,17 +7,48 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from api.commands.options import Data, Json, RigFileOption, Series, TestFileOption
-from api.commands.show import print_answer, print_json, tell
+from api.commands.show import findings_in_line, print_answer, print_json, tell
 
 if TYPE_CHECKING:
     from api.process import Acquisition
 
+EARLY = ("v0", "F_M", "t_c", "alpha_M", "eps_exact")
+"""Findings that are shown while the rest of the record is still read."""
 
-def acquire(rig: RigFileOption, test: TestFileOption, data: Data, series: Series = None, as_json: Json = False) -> None:
+
+def acquire(
+    rig: RigFileOption,
+    test: TestFileOption,
+    data: Data,
+    series: Series = None,
+    spare: Annotated[
+        Path | None, typer.Option("--spare", help="Where the run goes if --data does not take it.", metavar="DIR")
+    ] = None,
+    again: Annotated[bool, typer.Option("--again", help="Hit a specimen that was hit before.")] = False,
+    as_json: Json = False,
+) -> None:
     """Arm the rig, take one drop, make it safe, and say what it shows."""
-    from api.process import Acquisition
+    from api.early import start
 
-    _take(Acquisition("acquire", rig, data, test, series), data, as_json)
+    if not again and sys.stdin.isatty():
+        again = _asked(test, data)
+    _take(start(rig, test, data, series, spare, again), data, as_json)
+
+
+def _asked(test: Path, data: Path) -> bool:
+    """Whether a specimen that was hit before is to be hit again; asked only if it was."""
+    from daq.errors import AcquisitionError
+    from daq.specimen import refuse_used
+    from daq.store import Store
+    from daq.test_file import load_test
+
+    try:
+        refuse_used(Store(data), load_test(test)[1])
+    except AcquisitionError as e:
+        if not typer.confirm(f"{e}.\nHit it again?"):
+            raise typer.Exit(1) from None
+        return True
+    return False
 
 
 def recover(
@@ -37,14 +68,27 @@ def recover(
     _take(Acquisition("recover", rig, data, test, give_up=give_up), data, as_json)
 
 
-def check(rig: Annotated[Path, typer.Argument(help="Rig file.", metavar="RIG.toml")], as_json: Json = False) -> None:
+def check(
+    rig: Annotated[Path, typer.Argument(help="Rig file.", metavar="RIG.toml")],
+    tap: Annotated[bool, typer.Option("--tap", help="Wait for a tap on the tup: trigger and polarity.")] = False,
+    tare: Annotated[bool, typer.Option("--tare", help="Keep the zero level, against which drift is told.")] = False,
+    data: Annotated[Path | None, typer.Option("--data", help="Needed for --tare.", metavar="DIR")] = None,
+    as_json: Json = False,
+) -> None:
     """Look at the rig before the first specimen: identity, settings, interlock, gate, noise, link speed."""
     from rich.console import Console
     from rich.table import Table
 
     from api.process import Acquisition
 
-    acquisition = Acquisition("check", rig, None)
+    if tare and data is None:
+        raise typer.BadParameter("--tare needs --data: the zero level is kept there")
+    if tap and tare:
+        raise typer.BadParameter("give one of --tap and --tare")
+    acquisition = Acquisition("check", rig, data, more=["--tap"] * tap + ["--tare"] * tare)
+    for event in acquisition:
+        if event["event"] == "tap-now":
+            tell(event["text"])
     end = acquisition.result()
     rows = [{k: e[k] for k in ("name", "ok", "text")} for e in acquisition.events if e["event"] == "check"]
     good = end["event"] == "done"
@@ -109,7 +153,11 @@ def follow(acquisition: "Acquisition", as_json: bool, only_new: bool = False) ->
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     skip = len(acquisition.events) if only_new else 0
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"))
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:3.0f} %  {task.fields[rate]}"),
+    )
     end: dict[str, Any] = {}
     with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True), disable=as_json) as bar:
         task = None
@@ -120,9 +168,13 @@ def follow(acquisition: "Acquisition", as_json: bool, only_new: bool = False) ->
             if as_json:
                 print(json.dumps(event), file=sys.stderr, flush=True)
             elif event["event"] == "progress":
-                task = bar.add_task("reading the record", total=event["total"]) if task is None else task
-                bar.update(task, completed=event["done"])
-            elif event["event"] not in ("done", "failed"):
+                rate = f"{event['bytes'] / 1e3:.0f} kB, {event['rate_B_s'] / 1e3:.1f} kB/s"
+                task = bar.add_task("reading the record", total=event["total"], rate="") if task is None else task
+                bar.update(task, completed=event["done"], rate=rate)
+            elif event["event"] == "preliminary":
+                early = findings_in_line(event["findings"], EARLY)
+                bar.console.print(f"preliminary  {early}", highlight=False, markup=False)
+            elif event["event"] not in ("done", "failed", "window"):
                 bar.console.print(_words(event), highlight=False, markup=False)
     return end
 

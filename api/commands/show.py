@@ -53,6 +53,17 @@ def print_answer(answer: dict[str, Any]) -> None:
         console.print(f"! {warning['code']}: {warning['text']}", highlight=False, markup=False)
 
 
+def findings_in_line(findings: dict[str, Any], symbols: tuple[str, ...]) -> str:
+    """Some findings in a line: `F_M 712.3 ± 1.2 N`."""
+    found: list[str] = []
+    for symbol in symbols:
+        finding = findings[symbol]
+        if finding["value"] is not None:
+            unit, factor = EDGE.get(finding["unit"], (finding["unit"], 1.0))
+            found.append(f"{symbol} {value_with_u(finding['value'], finding['u'], factor)} {unit}".rstrip())
+    return ", ".join(found) or "nothing yet"
+
+
 def tell(text: str) -> None:
     """A line for the operator, on stderr."""
     print(text, file=sys.stderr, flush=True)

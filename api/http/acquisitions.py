@@ -23,7 +23,7 @@ router = APIRouter(tags=["rig"], dependencies=[Depends(only_known)], prefix="/ac
 
 
 class Order(BaseModel):
-    """One drop: the text of its test file (TOML), and the series it belongs to."""
+    """One drop: the text of its test file (TOML), the series it belongs to, and whether its specimen is hit again."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
 
@@ -31,6 +31,7 @@ class Order(BaseModel):
     series: Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[^\s\-\x00-\x1f][^\x00-\x1f]*$")] | None = (
         None
     )
+    again: bool = False
 
 
 def bench_of(shared: Shared) -> Bench:
@@ -48,7 +49,7 @@ OfBench = Annotated[Bench, Depends(bench_of)]
 @router.post("", status_code=202)
 def arm(bench: OfBench, order: Order) -> Response:
     """Configure the recorder and arm it for one drop."""
-    bench.start(order.test, order.series)
+    bench.start(order.test, order.series, order.again)
     return JSONResponse({"links": ACQUISITION}, 202, headers={"Location": CURRENT})
 
 

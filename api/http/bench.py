@@ -6,11 +6,14 @@ import threading
 from pathlib import Path
 from typing import Any
 
+from api.early import start
 from api.http.links import ACQUISITION, of_run
 from api.process import Acquisition
 from daq.errors import RigBusy
 from daq.lock import RigLock
 from daq.rig_file import load_rig
+from daq.specimen import refuse_used
+from daq.store import Store
 from daq.test_file import TestFile
 from daq.toml_file import parse
 
@@ -22,6 +25,8 @@ STATES = {
     "triggered": "triggered",
     "held": "reading",
     "reading": "reading",
+    "window": "reading",
+    "preliminary": "reading",
     "progress": "reading",
     "saved": "saved",
     "released": "saved",
@@ -32,7 +37,8 @@ STATES = {
 }
 """The state that an event of the acquisition leaves it in; other events leave it as it is."""
 NOTHING: dict[str, Any] = {
-    "state": "idle", "done": True, "run": None, "text": None, "outcome": None, "progress": None, "events": [],
+    "state": "idle", "done": True, "run": None, "text": None, "outcome": None, "progress": None, "preliminary": None,
+    "warnings": [], "events": [],
 }  # fmt: skip
 STARTING = "starting"
 UNNAMED = "unnamed.toml"
@@ -54,21 +60,24 @@ class Bench:
         """The acquisition that runs, or the last that ran."""
         return self._current
 
-    def start(self, test_text: str, series: str | None) -> None:
-        """Configure and arm, for a test of this text.
+    def start(self, test_text: str, series: str | None, again: bool = False) -> None:
+        """Configure and arm, for a test of this text. `again`: its specimen may have been hit before.
 
         Raises
         ------
         SettingsError : the text is no test file.
+        AcquisitionError : the specimen was hit before.
         RigBusy : an acquisition is running, of this service or another.
         """
         parse(test_text, TestFile, "the test file")
+        if not again:
+            refuse_used(Store(self._data), test_text)
         with self._lock:
             self._refuse_second()
             folder = Path(tempfile.mkdtemp(prefix="droptower-test-"))
             test = folder / UNNAMED
             test.write_text(test_text, encoding="utf-8")
-            self._current = Acquisition("acquire", self.rig, self._data, test, series)
+            self._current = start(self.rig, test, self._data, series, again=again)
         threading.Thread(target=_sweep, args=(self._current, folder), daemon=True).start()
 
     def recover(self) -> None:
@@ -122,15 +131,19 @@ def after(state: str, event: dict[str, Any]) -> str:
 
 def told(events: list[dict[str, Any]]) -> dict[str, Any]:
     """What a row of events amounts to."""
-    state, run, text, outcome, progress = STARTING, None, None, None, None
+    state, run, text, outcome, progress, early = STARTING, None, None, None, None, None
     for event in events:
         state = after(state, event)
         run = event.get("run") or run
         text, outcome = event.get("text"), event.get("outcome")
         if event["event"] == "progress":
-            progress = {"done": event["done"], "total": event["total"]}
+            progress = {key: event.get(key) for key in ("done", "total", "bytes", "rate_B_s", "left_s")}
+        if event["event"] == "preliminary":
+            early = {key: event[key] for key in ("findings", "warnings")}
+    warnings = [{"code": e["code"], "text": e["text"]} for e in events if e["event"] == "warning"]
     links = {**ACQUISITION, "run": of_run(run)["self"] if run is not None and state == "saved" else None}
-    facts = {"state": state, "run": run, "text": text, "outcome": outcome, "progress": progress}
+    facts: dict[str, Any] = {"state": state, "run": run, "text": text, "outcome": outcome, "progress": progress}
+    facts |= {"preliminary": early, "warnings": warnings}
     return {**facts, "events": events, "links": links}
 
 

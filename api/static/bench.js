@@ -23,8 +23,10 @@ const SAYS = {
 const RUNNING = ["starting", "connected", "configured", "waiting", "armed", "triggered", "reading"];
 const DISARMABLE = ["starting", "connected", "configured", "waiting", "armed"];
 const NOTHING_HELD = ["interlock", "no-trigger", "aborted", "RigBusy", "SettingsError"]; // ends that leave no record
+const EARLY = [["v0", "m/s", 1], ["F_M", "N", 1], ["t_c", "ms", 1e3], ["alpha_M", "mm", 1e3], ["eps_exact", "", 1]];
 const $ = (id) => document.getElementById(id);
 let stream = null;
+let warned = [];
 
 function show(state, text = null, progress = null, outcome = null) {
   const [mark, word, usual] = SAYS[state];
@@ -32,6 +34,7 @@ function show(state, text = null, progress = null, outcome = null) {
   $("banner").dataset.state = state;
   $("state-mark").textContent = mark;
   $("state-word").textContent = state === "reading" && share !== null ? `${word} ${Math.floor(100 * share)} %` : word;
+  $("pace").textContent = state === "reading" && progress ? pace(progress) : "";
   $("state-text").textContent = text || usual;
   $("progress").hidden = state !== "reading";
   if (share === null) $("progress").removeAttribute("value"); // a bar that moves without an amount
@@ -48,6 +51,35 @@ function words(state, { run, text }) {
   return state === "armed" ? null : text;
 }
 
+function pace({ bytes, rate_B_s: rate, left_s: left }) {
+  const kilobytes = (n) => (n / 1e3).toPrecision(3);
+  return `${kilobytes(bytes)} kB, ${kilobytes(rate)} kB/s, ${left === null ? "?" : left.toFixed(left < 10 ? 1 : 0)} s left`;
+}
+
+// What the contact shows while the rest of the record is still being read.
+function early(found) {
+  const said = found
+    ? EARLY.filter(([symbol]) => found.findings[symbol]?.value != null).map(
+        ([symbol, unit, factor]) => `${symbol} ${(found.findings[symbol].value * factor).toPrecision(4)} ${unit}`.trim(),
+      )
+    : [];
+  $("early").hidden = said.length === 0;
+  $("early").textContent = said.length ? `Preliminary: ${said.join(" · ")}` : "";
+}
+
+function warn(warnings) {
+  warned = warnings;
+  $("told").replaceChildren(
+    ...warnings.map(({ code, text }) => {
+      const item = document.createElement("li");
+      item.textContent = text;
+      item.dataset.code = code;
+      return item;
+    }),
+  );
+  $("told").hidden = warnings.length === 0;
+}
+
 function complain(words) {
   $("order-error").textContent = words;
   $("order-error").hidden = words === "";
@@ -59,7 +91,13 @@ function follow() {
   stream.onmessage = async ({ data }) => {
     const event = JSON.parse(data);
     show(event.state, words(event.state, event), event.event === "progress" ? event : null, event.outcome);
-    if (event.event === "saved") await refresh();
+    if (event.event === "preliminary") early(event);
+    if (event.event === "saved") {
+      early(null);
+      await refresh();
+    }
+    if (event.event === "connected") warn([]);
+    if (event.event === "warning") warn([...warned, event]);
     if (event.event === "done" || event.event === "failed") {
       stream?.close();
       stream = null;
@@ -72,6 +110,8 @@ function follow() {
 async function tell() {
   const now = await askJson(`${PATH}/current`);
   show(now.state, words(now.state, now), now.progress, now.outcome);
+  warn(now.warnings);
+  early(now.state === "reading" ? now.preliminary : null);
   return now;
 }
 
@@ -96,6 +136,10 @@ async function start(path, order) {
     show("starting");
     follow();
   } catch (error) {
+    if (error.code === "specimen" && confirm(`${error.message}\n\nHit it again?`)) {
+      await start(path, { ...order, again: true });
+      return;
+    }
     complain(error.message);
     await catchUp().catch(() => show("lost"));
   }

@@ -3,13 +3,15 @@
 export async function ask(path, options = {}) {
   const answer = await fetch(path, options);
   if (answer.ok) return answer;
-  let words = `${answer.status} ${answer.statusText}`;
+  const error = new Error(`${answer.status} ${answer.statusText}`);
   try {
-    words = (await answer.json()).error.text;
+    const told = (await answer.json()).error;
+    error.message = told.text;
+    error.code = told.code;
   } catch {
     // not an answer of the service itself
   }
-  throw new Error(words);
+  throw error;
 }
 
 export async function askJson(path, options = {}) {
