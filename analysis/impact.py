@@ -80,5 +80,11 @@ def _events(record: Record, impact: Impact, events: Events, answer: Answer) -> N
     answer.set("bounces", events.bounces)
     if events.second is not None:
         answer.set("t_second", events.second.t, events.second.u)
+        after = 1e3 * (events.second.t - events.t[0])
+        text = (
+            f"the dart hit the specimen again {after:.0f} ms after the first contact: marks and damage may be of "
+            "either hit; a catcher prevents it"
+        )
+        answer.warn("second-hit", text)
         if events.end is not None:
             answer.set("t_nc", events.second.t - events.end.t, math.hypot(events.second.u, events.end.u))

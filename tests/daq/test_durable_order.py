@@ -47,8 +47,8 @@ def test_write_sync_rename_sync_read_back_and_only_then_acknowledge(emulator: Em
         found = next((i for i in range(at, len(lines)) if re.search(step, lines[i])), None)
         assert found is not None, f"{step} does not come after the steps before it"
         at = found + 1
-    renamed = next(i for i, line in enumerate(lines) if re.search(STEPS[4], line))
-    # The quiet record before arming is let go as well, long before.
-    acknowledged = [i for i, line in enumerate(lines) if "TRAC:ACK" in line and i > renamed - 200]
+    # A quiet record is taken and let go as well, before arming.
+    armed = next(i for i, line in enumerate(lines) if re.search(r"write\(1.*armed", line))
+    acknowledged = [i for i, line in enumerate(lines) if "TRAC:ACK" in line and i > armed]
     assert len(acknowledged) == 1, "an acknowledgement is sent once"
     assert not any(re.search(r"(write|fsync)\(\d+<[^>]*raw\.h5>", line) for line in lines[acknowledged[0] :])
