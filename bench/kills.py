@@ -70,22 +70,24 @@ class Study:
             daq.end()
         daq.close()
         saved = next((e["run"] for e in daq.events if e["event"] == "saved"), None)
-        captured = self._captured(fell)
+        armed = next((e["record_id"] for e in daq.events if e["event"] == "armed"), None)
+        captured = self._captured(fell, armed)
         if self.of == "emulator" and saved is None and daq.events[-1]["event"] != "failed":
             return f"nothing was told: {daq.events[-1]}"
         return self._recover(captured, saved, before)
 
-    def _captured(self, fell: bool) -> bool:
-        """Whether the recorder has completed its record."""
+    def _captured(self, fell: bool, armed: int | None) -> bool:
+        """Whether the recorder has completed the record of a drop; the quiet one before arming is none."""
         if self.of == "emulator":
             log = self.emulator.log
             self.emulator.stop()
             self.emulator = self._start()
-            return ": held" in log
-        if not fell and self._state() in ("armed", "filling"):
-            until(lambda: self._state() == "armed")
+            return f"record {armed}: held" in log
+        until(lambda: self._state() in AT_REST)
+        if not fell and self._state() == "armed":
             self.emulator.do("release")  # the recorder needs no host to catch a drop
             fell = True
+            until(lambda: self._state() != "armed")
         until(lambda: self._state() in AT_REST)
         return fell
 

@@ -208,7 +208,13 @@ def scpi_unpaced(tries: int) -> None:
         device = scpi_device(tcp, 921600)
         ratio("SCPI, TCP, 1,000,000 samples", 0.5, bare_tcp(tcp, samples), whole(device), 3 * tries)
         promised = promised_tcp(tcp, samples)
-        ratio("the same against a loop that keeps, checks and notes, each step bare", 0, promised, whole(device), 3 * tries)
+        ratio(
+            "the same against a loop that keeps, checks and notes, each step bare",
+            0,
+            promised,
+            whole(device),
+            3 * tries,
+        )
         device.close()
 
 

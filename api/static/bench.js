@@ -23,7 +23,7 @@ const SAYS = {
 const RUNNING = ["starting", "connected", "configured", "waiting", "armed", "triggered", "reading"];
 const DISARMABLE = ["starting", "connected", "configured", "waiting", "armed"];
 const NOTHING_HELD = ["interlock", "no-trigger", "aborted", "RigBusy", "SettingsError"]; // ends that leave no record
-const EARLY = [["v0", "m/s", 1], ["F_M", "N", 1], ["t_c", "ms", 1e3], ["alpha_M", "mm", 1e3], ["eps_exact", "", 1]];
+const EARLY = [["v0", "v₀", "m/s", 1], ["F_M", "F_M", "N", 1], ["t_c", "t_c", "ms", 1e3], ["alpha_M", "α_M", "mm", 1e3], ["eps_exact", "ε", "", 1]];
 const $ = (id) => document.getElementById(id);
 let stream = null;
 let warned = [];
@@ -60,7 +60,7 @@ function pace({ bytes, rate_B_s: rate, left_s: left }) {
 function early(found) {
   const said = found
     ? EARLY.filter(([symbol]) => found.findings[symbol]?.value != null).map(
-        ([symbol, unit, factor]) => `${symbol} ${(found.findings[symbol].value * factor).toPrecision(4)} ${unit}`.trim(),
+        ([symbol, name, unit, factor]) => `${name} ${(found.findings[symbol].value * factor).toPrecision(4)} ${unit}`.trim(),
       )
     : [];
   $("early").hidden = said.length === 0;
