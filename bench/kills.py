@@ -1,6 +1,7 @@
 """Kill the host, or the emulator, (-9) at each step of a drop, recover, and see that nothing is lost.
 
-    .venv/bin/python bench/kills.py [--of host|emulator] [--kills 1000] [--seed 1] [--progress FILE]
+    .venv/bin/python bench/kills.py [--of host|emulator] [--kills 1000] [--seed 1] [--at-once N]
+        [--progress FILE]
 
 Each drop is a real one. All steps are hit alike, up to 30 ms after the host told them. `recover` then has to leave
 exactly one whole run of a record that was captured, the recorder free, and what was reported saved unchanged; a device
@@ -13,8 +14,10 @@ import json
 import random
 import sys
 import tempfile
+import threading
 import time
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
@@ -112,41 +115,66 @@ class Study:
         return None
 
 
+class Count:
+    """How often each step was hit and what was lost, kept in a file if one is given."""
+
+    def __init__(self, given: argparse.Namespace) -> None:
+        """Where the study stands."""
+        self.given, self.hit, self.losses = given, Counter[int](), list[str]()
+        self._lock = threading.Lock()
+        if given.progress is not None and given.progress.exists():
+            kept = json.loads(given.progress.read_text())
+            if (kept["of"], kept["seed"]) != (given.of, given.seed):
+                raise SystemExit(f"{given.progress} is of another study: {kept['of']}, seed {kept['seed']}")
+            self.hit.update(kept["done"])
+            self.losses = kept["losses"]
+
+    def add(self, n: int, wrong: str | None) -> None:
+        """Kill number ``n`` is over."""
+        with self._lock:
+            self.hit[n] += 1
+            if wrong is not None:
+                self.losses.append(f"kill {n} at {STEPS[n % len(STEPS)]}: {wrong}")
+            if self.given.progress is not None:
+                state = {"of": self.given.of, "seed": self.given.seed, "done": sorted(self.hit), "losses": self.losses}
+                self.given.progress.write_text(json.dumps(state))
+            done = self.hit.total()
+            if sys.stderr.isatty() or done % 25 == 0:
+                words = f"{done} of {self.given.kills} kills, {len(self.losses)} losses"
+                print(words, file=sys.stderr, flush=True)
+
+
+def run(count: Count, numbers: list[int]) -> int:
+    """Kill, recover, count, in a folder of its own; damaged runs."""
+    given = count.given
+    with tempfile.TemporaryDirectory() as name:
+        study = Study(Path(name), given.of, given.seed)
+        for n in numbers:
+            count.add(n, study.kill(STEPS[n % len(STEPS)], random.Random(given.seed * 1_000_003 + n)))
+        damaged = sum(bool(check.faults) for check in study.store.verify())
+        study.emulator.stop()
+    return damaged
+
+
 def main() -> int:
     """Kill, recover, count."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--of", choices=("host", "emulator"), default="host")
     parser.add_argument("--kills", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--at-once", type=int, default=1, help="so many rigs, each with its own emulator")
     parser.add_argument("--progress", type=Path, metavar="FILE", help="where the study stands")
     given = parser.parse_args()
-    hit: Counter[str] = Counter()
-    losses: list[str] = []
-    if given.progress is not None and given.progress.exists():
-        kept = json.loads(given.progress.read_text())
-        if (kept["of"], kept["seed"]) != (given.of, given.seed):
-            parser.error(f"{given.progress} is of another study: {kept['of']}, seed {kept['seed']}")
-        hit, losses = Counter(kept["hit"]), kept["losses"]
-    with tempfile.TemporaryDirectory() as name:
-        study = Study(Path(name), given.of, given.seed)
-        for n in range(hit.total(), given.kills):
-            step = STEPS[n % len(STEPS)]
-            if (wrong := study.kill(step, random.Random(given.seed * 1_000_003 + n))) is not None:
-                losses.append(f"kill {n} at {step}: {wrong}")
-            hit[step] += 1
-            if given.progress is not None:
-                state = {"of": given.of, "seed": given.seed, "hit": hit, "losses": losses}
-                given.progress.write_text(json.dumps(state))
-            if sys.stderr.isatty() or n % 25 == 24:
-                print(f"{n + 1} of {given.kills} kills, {len(losses)} losses", file=sys.stderr, flush=True)
-        faults = [c for c in study.store.verify() if c.faults]
-        study.emulator.stop()
+    count = Count(given)
+    left = [n for n in range(given.kills) if n not in count.hit]
+    with ThreadPoolExecutor(given.at_once) as pool:
+        damaged = sum(pool.map(lambda k: run(count, left[k :: given.at_once]), range(given.at_once)))
     print(f"| {given.of} killed at | times |\n|---|---|")
-    for step in STEPS:
-        print(f"| {step} | {hit[step]} |")
-    print(f"\n{given.kills} kills of the {given.of}, {len(losses)} lost, {len(faults)} damaged runs")
-    print("\n".join(losses))
-    return 1 if losses or faults else 0
+    for number, step in enumerate(STEPS):
+        print(f"| {step} | {sum(n % len(STEPS) == number for n in count.hit)} |")
+    print(f"\n{given.kills} kills of the {given.of}, {len(count.losses)} lost, {damaged} damaged runs")
+    print("\n".join(count.losses))
+    return 1 if count.losses or damaged else 0
 
 
 if __name__ == "__main__":
