@@ -42,7 +42,7 @@ faults: .venv/installed-dev
 KILLS ?= 1000
 kills: .venv/installed-dev
 	$(BIN)/python bench/kills.py --of host --kills $(KILLS)
-	$(BIN)/python bench/kills.py --of emulator --kills $(KILLS)
+	$(BIN)/python bench/kills.py --of emulator --kills $(KILLS) --at-once 4
 
 lint: .venv/installed-dev
 	$(BIN)/ruff check .
