@@ -56,6 +56,8 @@ def cases() -> list[Case]:
         for wire in (w for w in WIRES if LANGUAGES[w] in kind.languages):
             if name == "exception":
                 found += [Case(name, wire, "read", {"code": code}) for code in CODES]
+            elif name == "clamped_settings":
+                found.append(Case(name, wire, "settings", {"nth": 2}))  # the first are those of the quiet record
             elif kind.where == "event":
                 found.append(Case(name, wire, "whole"))
             elif name == "device_reset":
@@ -122,7 +124,9 @@ class Bench:
     def _drop(self, wire: str, step: str, fault: dict[str, Any]) -> tuple[Daq, float]:
         """One drop by `acquire`, the fault set at its step; seconds from the release to the end."""
         daq = Daq("acquire", self._rig(wire), self.folder / "data", "--test", str(write_test(self.folder)))
-        at = {"arm": "configured", "armed": "armed", "whole": "connected"}.get(step, "triggered")
+        at = {"arm": "configured", "armed": "armed", "whole": "configured", "settings": "connected"}.get(
+            step, "triggered"
+        )
         begun = time.monotonic()
         for event in daq:
             if fault and event["event"] == at:

@@ -1,6 +1,7 @@
 """The commands on a rig, from the command line to the answer."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -107,3 +108,48 @@ def test_the_demo_agrees_with_what_the_emulator_was_set_to(tmp_path: Path) -> No
     for published in ("709", "1045", "2.61"):
         assert published in done.stdout
     assert len(list((tmp_path / "d" / "runs").iterdir())) == 6
+
+
+def _asked(command: list[Any], answer: str) -> tuple[int, str]:
+    """Run a command on a terminal, answer its question; its exit code and what it said."""
+    terminal, end = os.openpty()
+    process = subprocess.Popen(command, stdin=end, stdout=end, stderr=end, start_new_session=True)
+    os.close(end)
+    said = ""
+    while True:
+        try:
+            said += os.read(terminal, 4096).decode()
+        except OSError:
+            break
+        if "again? [y/N]" in said and answer:
+            os.write(terminal, answer.encode())
+            answer = ""
+    os.close(terminal)
+    return process.wait(), said
+
+
+def test_a_specimen_that_was_hit_is_asked_about_on_a_terminal(tmp_path: Path) -> None:
+    with Emulator("--seed", "3") as emulator:
+        rig = write_rig(tmp_path, emulator.endpoints["scpi_tcp"], "scpi", wait_s=1.0)
+        command = [DROPTOWER, "acquire", "--rig", rig, "--test", write_test(tmp_path), "--data", tmp_path / "data"]
+        first = subprocess.Popen(
+            [*command, "--json"], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+        )
+        assert first.stderr is not None
+        for line in first.stderr:
+            if '"armed"' in line:
+                emulator.do("height", v0=1.39)
+                emulator.do("release")
+        assert first.wait() == 0
+        first.stderr.close()
+        code, said = _asked(command, "n\n")
+        assert code == 1
+        assert "was hit before" in said
+        assert "armed" not in said.lower()
+        until(lambda: not emulator.do("status")["moving"])
+        code, said = _asked(command, "y\n")
+        assert "ARMED" in said
+        assert "no trigger" in said
+        refused = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+        assert refused.returncode == 1
+        assert "--again" in refused.stderr

@@ -118,3 +118,47 @@ def test_at_the_bench_a_drop_is_armed_dropped_and_on_screen(
     expect(page.locator("#newest .js-plotly-plot")).to_have_attribute("data-run", run)
     expect(page.locator("#runs tbody tr")).to_have_count(1)
     app.state.service.bench.current.result()
+
+
+def test_the_bench_shows_what_is_told_and_the_contact_before_the_rest(
+    open_page: Open, serve_app: Serve, tmp_path: Path
+) -> None:
+    with Emulator("--seed", "7", "--baud", "460800") as tower:
+        tower.do("catcher", on=True)
+        tower.do("height", v0=1.39)
+        rig = write_rig(tmp_path, tower.endpoints["scpi_pty"], "scpi", samples=100_000)
+        app = create_app(tmp_path / "data", rig)
+        page = open_page(serve_app(app))
+        banner = page.locator("#banner")
+        page.get_by_label("Test file").fill(TEST)
+        page.get_by_role("button", name="ARM", exact=True).click()
+        expect(banner).to_contain_text("ARMED – DROP NOW", timeout=15_000)
+        expect(page.get_by_role("list", name="Told before arming")).to_contain_text("the catcher is on")
+        tower.do("release")
+        expect(page.locator("#early")).to_contain_text("F_M 71", timeout=15_000)
+        expect(page.locator("#pace")).to_contain_text("kB/s")
+        expect(banner).to_have_attribute("data-state", "reading")
+        expect(banner).to_contain_text("SAVED", timeout=15_000)
+        expect(page.locator("#early")).to_be_hidden()
+        app.state.service.bench.current.result()
+        # The specimen was hit: the page asks, and takes no for an answer.
+        asked: list[str] = []
+        page.on("dialog", lambda dialog: (asked.append(dialog.message), dialog.dismiss()))
+        page.get_by_role("button", name="ARM", exact=True).click()
+        expect(page.locator("#order-error")).to_contain_text("was hit before")
+        assert "Hit it again?" in asked[0]
+
+
+def test_the_bench_hits_a_specimen_again_if_it_is_told_to(
+    open_page: Open, serve_app: Serve, tmp_path: Path, tower: Emulator
+) -> None:
+    tower.fresh()
+    publish(tmp_path / "data", [drop(specimen__id="s-1")])
+    app = create_app(tmp_path / "data", write_rig(tmp_path, tower.endpoints["scpi_tcp"], "scpi"))
+    page = open_page(serve_app(app))
+    page.on("dialog", lambda dialog: dialog.accept())
+    page.get_by_label("Test file").fill(TEST)
+    page.get_by_role("button", name="ARM", exact=True).click()
+    expect(page.locator("#banner")).to_contain_text("ARMED – DROP NOW", timeout=15_000)
+    app.state.service.bench.current.abort()
+    app.state.service.bench.current.result()
