@@ -13,6 +13,8 @@ from typing import Any
 from daq.errors import DaqError
 
 Event = dict[str, Any]
+ENDS = ("done", "failed")
+"""Events that an acquisition ends with."""
 
 
 class ProcessError(DaqError):
@@ -75,7 +77,7 @@ class Acquisition:
         reader.join()
         out.close()
         err.close()
-        if not self.events or self.events[-1]["event"] not in ("done", "failed"):
+        if not self.events or self.events[-1]["event"] not in ENDS:
             last = b"".join(words).decode(errors="replace").strip().rpartition("\n")[2]
             text = f"acquisition ended with code {code}: {last or 'no word'}; what the recorder holds it still holds"
             self._add({"event": "failed", "outcome": "died", "text": text})
@@ -110,6 +112,11 @@ class Acquisition:
     @property
     def done(self) -> bool:
         return self._ended
+
+    @property
+    def said_its_last(self) -> bool:
+        """Whether the event that ends every acquisition has come, though its process may still be there."""
+        return bool(self.events) and self.events[-1]["event"] in ENDS
 
     def abort(self) -> None:
         """Disarm. A record whose trigger has come is read and saved all the same."""

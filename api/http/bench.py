@@ -92,6 +92,8 @@ class Bench:
             self._current = Acquisition("recover", self.rig, self._data)
 
     def _refuse_second(self) -> None:
+        if self._current is not None and self._current.said_its_last:
+            self._current.result()  # its process is about to end
         if self._current is not None and not self._current.done:
             raise RigBusy(f"a drop is {told(self._current.events)['state']} on this rig; disarm it or wait for its end")
         if (holder := self._held_elsewhere()) is not None:
