@@ -35,7 +35,7 @@ class ModbusDevice:
     """A device on an RTU line or `tcp://`; see `daq.recorder.Device`. `channels`: of the rig file."""
 
     def __init__(self, port: str, baud: int, unit_id: int, profile: ModbusProfile, channels: int) -> None:
-        self._bus = Modbus(port, baud, unit_id)
+        self._bus = Modbus(port, baud, unit_id, profile.patience_s)
         self._profile, self._channels = profile, channels
         self._high_first = profile.order != "low-first"
         self._at_once = profile.at_once
@@ -133,7 +133,7 @@ class ModbusDevice:
 
     def identity(self) -> str:
         found = self._values("identity")
-        return str(found["identity"]) if found else f"Modbus unit {self._bus.unit}"
+        return str(found["identity"]) if found else f"Modbus unit {self._bus.unit} on {self._bus.port}"
 
     def status(self) -> Status:
         return self._status_of(self._values(*STATUS))

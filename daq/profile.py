@@ -18,6 +18,8 @@ SETTINGS = READ_BACK | {"pretrigger_s", "window_s", "center_s"}
 SPAN = {"channel", "start", "count", "first", "last"}
 ACKNOWLEDGEMENT = {"record", "crc"}
 
+Patience = Annotated[float, Field(gt=0, le=60)]
+"""s, how long the first byte of a reply is waited for."""
 Sample = Literal["i8", "u8", "i16", "u16"]
 Number = Literal["u16", "i16", "u32", "i32", "u64", "i64", "f32"]
 State = Literal["idle", "filling", "armed", "measuring", "complete"]
@@ -149,6 +151,7 @@ class ScpiProfile(Part):
 
     driver: Literal["scpi"]
     tried_on: str
+    patience_s: Patience = 1.0
     identity: str = "*IDN?"
     errors: str | None = None
     level: Literal["counts", "volts"] = "counts"
@@ -261,6 +264,7 @@ class ModbusProfile(Part):
 
     driver: Literal["modbus"]
     tried_on: str
+    patience_s: Patience = 1.0
     order: Literal["sentinel", "high-first", "low-first"] = "high-first"
     at_once: Annotated[int, Field(ge=1, le=16)] = 1
     bits: Annotated[int, Field(ge=4, le=16)] = 16

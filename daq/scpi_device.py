@@ -63,7 +63,7 @@ class ScpiDevice:
     """A device on a serial line or a socket; see `daq.recorder.Device`. `channels`: how many the rig file names."""
 
     def __init__(self, port: str, baud: int, profile: ScpiProfile, channels: int) -> None:
-        self._scpi = Scpi(Wire(port, baud), profile.errors)
+        self._scpi = Scpi(Wire(port, baud, profile.patience_s), profile.errors)
         self._profile, self._channels = profile, channels
         self._order = "<" if profile.data is not None and profile.data.order == "low-first" else ">"
 

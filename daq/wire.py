@@ -88,13 +88,15 @@ class _Socket:
 class Wire:
     """An open serial line (`rfc2217://` too) or raw TCP socket (`socket://host:port`).
 
+    patience_s : how long a reply's first byte is waited for
+
     Raises
     ------
     LinkError : the port is not there, is taken, or its address makes no sense.
     """
 
-    def __init__(self, port: str, baud: int) -> None:
-        self.port, self._baud = port, baud
+    def __init__(self, port: str, baud: int, patience_s: float = PROGRESS_LIMIT_S) -> None:
+        self.port, self._baud, self._patience_s = port, baud, patience_s
         self._buffer = bytearray()
         self._stream: Stream | None = None
         self._open()
@@ -122,27 +124,27 @@ class Wire:
         except (serial.SerialException, OSError) as e:
             raise self._lost("writing", e) from None
 
-    def read_exactly(self, size: int, first_byte_s: float = PROGRESS_LIMIT_S) -> bytes:
+    def read_exactly(self, size: int) -> bytes:
         """`size` bytes.
 
         Raises
         ------
-        NoReply : nothing came for `first_byte_s` at the start, or for PROGRESS_LIMIT_S later; says how much did come.
+        NoReply : nothing came for `patience_s` at the start, or for PROGRESS_LIMIT_S later; says how much did come.
         """
         while len(self._buffer) < size:
-            self._fill(size - len(self._buffer), first_byte_s if not self._buffer else PROGRESS_LIMIT_S, size)
+            self._fill(size - len(self._buffer), self._patience_s if not self._buffer else PROGRESS_LIMIT_S, size)
         taken = bytes(memoryview(self._buffer)[:size])
         del self._buffer[:size]
         return taken
 
-    def read_line(self, first_byte_s: float = PROGRESS_LIMIT_S, limit: int = 4096) -> bytes:
+    def read_line(self, limit: int = 4096) -> bytes:
         """Up to LF, which is left out with a CR before it. For text replies alone: data may hold an LF anywhere."""
         searched = 0
         while (end := self._buffer.find(b"\n", searched)) < 0:
             searched = len(self._buffer)
             if searched > limit:
                 raise NoReply(f"port {self.port}: {searched} bytes without an end of line")
-            self._fill(1, first_byte_s if not self._buffer else PROGRESS_LIMIT_S, searched + 1)
+            self._fill(1, self._patience_s if not self._buffer else PROGRESS_LIMIT_S, searched + 1)
         line = bytes(self._buffer[:end])
         del self._buffer[: end + 1]
         return line.rstrip(b"\r")
