@@ -24,6 +24,8 @@ UNITS: dict[str, str] = {
     "E_diss": "J",
     "alpha_r": "m",
     "t_contact": "s",
+    "alpha_perm": "m",
+    "mark_diameter": "m",
     # beyond the contract
     "bounces": "1",
     "t_second": "s",
