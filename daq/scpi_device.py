@@ -79,6 +79,7 @@ class ScpiDevice:
 
     def resynchronise(self) -> None:
         self._scpi.wire.drain()
+        self._scpi.errors()  # of what was garbled on the way: nobody shall take them for a refusal of the next command
         if self._profile.data is None or self._profile.data.sentinel is None:
             return
         word = self._scpi.block(self._profile.data.sentinel, 2)
