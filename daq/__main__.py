@@ -9,6 +9,7 @@ import contextlib
 import json
 import signal
 import sys
+import traceback
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -111,6 +112,14 @@ def main() -> int:
     except DaqError as e:
         outcome = e.outcome if isinstance(e, AcquisitionError) else type(e).__name__
         _emit("failed", outcome=outcome, text=str(e))
+        return 1
+    except (
+        Exception
+    ) as e:  # an error of ours: the operator is told what is safe, and the log of the folder has the rest
+        text = (
+            f"an error inside droptower ({type(e).__name__}: {e}); a captured record is still held: `recover` reads it"
+        )
+        _emit("failed", outcome="internal", text=text, trace=traceback.format_exc())
         return 1
     _emit("done", run=run)
     return 0

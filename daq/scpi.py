@@ -1,5 +1,7 @@
 """SCPI over a wire: text queries and definite-length blocks, every length checked."""
 
+import math
+
 from daq.errors import BadReply, DeviceError, LinkError
 from daq.wire import Wire
 
@@ -83,9 +85,12 @@ class Scpi:
         """The reply to a query as numbers, whole ones exactly."""
         reply = self.query(text)
         try:
-            return [int(v) if v.strip().lstrip("+-").isdigit() else float(v) for v in reply.split(",")]
+            values = [int(v) if v.strip().lstrip("+-").isdigit() else float(v) for v in reply.split(",")]
         except ValueError:
-            raise BadReply(f"{self.wire.port}: {text} was answered {reply[:80]!r}, not with numbers") from None
+            values = [math.nan]
+        if not all(math.isfinite(v) for v in values):
+            raise BadReply(f"{self.wire.port}: {text} was answered {reply[:80]!r}, not with numbers")
+        return values
 
     def ascii_numbers(self, text: str) -> list[int]:
         """The samples that answer a query that was sent, as text; a block's head before them is passed over."""

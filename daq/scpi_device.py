@@ -236,10 +236,10 @@ class ScpiDevice:
         gate = self._profile.gate
         if gate is None or gate.query is None:
             raise DeviceError(f"{self._scpi.wire.port}: its profile has no [gate] with a query")
-        record_id, count, *edges = self._scpi.numbers(gate.query)
-        if len(edges) != count:
-            raise BadReply(f"{self._scpi.wire.port}: {gate.query} announces {count} edges and gives {len(edges)}")
-        return GateReading(record_id, tuple(edges))
+        values = self._scpi.numbers(gate.query)
+        if len(values) < 2 or len(values) != 2 + values[1]:
+            raise BadReply(f"{self._scpi.wire.port}: {gate.query} gives record, number of edges, edges; not {values}")
+        return GateReading(values[0], tuple(values[2:]))
 
     def beam_free(self) -> bool | None:
         gate = self._profile.gate
