@@ -6,12 +6,12 @@ import threading
 from collections.abc import Iterator
 
 import pytest
+from emulator import Emulator
 
 from daq.errors import DaqError, NoReply
 from daq.profile import ScpiProfile, load_profile
 from daq.scpi_device import ScpiDevice
 from daq.wire import Wire
-from emulator import Emulator
 
 TRIES = 400
 
@@ -21,7 +21,11 @@ def replies() -> Iterator[dict[str, bytes]]:
     """What the emulator answers to each query that acquisition sends, but blocks."""
     profile = load_profile("droptower-scpi", "scpi")[0]
     assert isinstance(profile, ScpiProfile)
-    assert profile.status and profile.header and profile.gate and profile.gate.query and profile.interlock
+    assert profile.status
+    assert profile.header
+    assert profile.gate
+    assert profile.gate.query
+    assert profile.interlock
     asked = [profile.identity, profile.status.query, profile.header.query, profile.gate.query, profile.interlock.query]
     asked += [profile.errors or "", *(s.query for s in profile.settings.values())]
     with Emulator() as emulator:
@@ -31,7 +35,7 @@ def replies() -> Iterator[dict[str, bytes]]:
             wire.write(f"{query}\n".encode())
             found[query] = wire.read_line()
         wire.close()
-    yield found
+    return found
 
 
 def garbled(line: bytes, rng: random.Random) -> bytes:
