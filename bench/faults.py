@@ -30,6 +30,8 @@ SAMPLES = 20_000
 LANGUAGES = {"scpi_pty": "scpi", "scpi_tcp": "scpi", "modbus_rtu": "rtu", "modbus_tcp": "tcp"}
 CODES = (1, 2, 3, 4, 5, 6, 8, 10, 11)
 AT_READ = ("busy", "exception", "swapped_bytes", "swapped_channels", "bad_crc32", "overwritten")
+LAST_WRITE = {"modbus_rtu": 7, "modbus_tcp": 6}
+"""Writes between the trigger and the one that lets the record go."""
 CHANNELS = 2
 """So that there are channels to swap."""
 
@@ -88,7 +90,7 @@ def settings(case: Case, rng: random.Random) -> dict[str, Any]:
             keys["skip"] = rng.randint(1, 2) if scpi else rng.randint(100, 250)
     elif case.step == "release":
         keys["command"] = "SYST:ERR?" if scpi else "FC16"
-        keys["skip"] = 0 if scpi else rng.randint(6, 7)
+        keys["skip"] = 0 if scpi else LAST_WRITE[case.wire] - rng.randint(0, 1)
     return keys
 
 
