@@ -31,6 +31,8 @@ class Impact:
     tip_radius, thickness, support_radius : m; nu : 1, Poisson's ratio of the specimen
     v0 : m/s, speed at first contact when given outright; height : m, drop height
     g : m/s²; friction : N, guide friction, against the motion; catcher : the rebounding dart is caught
+    tip_E : Pa, of the tip, None: rigid; tip_nu : 1
+    u_thickness, u_nu, u_tip_radius, u_support_radius,
     u_v0, u_height, u_mass, u_tip_mass : standard uncertainties in the unit of the quantity
     u_gain : 1, relative standard uncertainty of the force scale
     """
@@ -54,6 +56,12 @@ class Impact:
     u_mass: float = 0.0
     u_tip_mass: float = 0.0
     u_gain: float = 0.0
+    u_thickness: float = 0.0
+    u_nu: float = 0.0
+    u_tip_radius: float = 0.0
+    u_support_radius: float = 0.0
+    tip_E: float | None = None
+    tip_nu: float = 0.3
 
     @property
     def g_falling(self) -> float:

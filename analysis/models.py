@@ -22,6 +22,18 @@ def contact_stiffness(tip_radius: float, E: float, nu: float) -> float:
     return 4 / 3 * math.sqrt(tip_radius) * E / (1 - nu**2)
 
 
+def tip_stiffness(
+    tip_radius: float, E: float, nu: float, tip_E: float | None = None, tip_nu: float = 0.3
+) -> tuple[float, float]:
+    """K_i in N/m^1.5 under a tip that may be compliant (P2 (8)), and the share of ln E in ln K_i (1 under a rigid one).
+
+    4/3·√r/((1 − ν₁²)/E₁ + (1 − ν₂²)/E₂); E, tip_E in Pa, tip_E None: rigid.
+    """
+    own = (1 - nu**2) / E
+    both = own + (0.0 if tip_E is None else (1 - tip_nu**2) / tip_E)
+    return 4 / 3 * math.sqrt(tip_radius) / both, own / both
+
+
 def plate_stiffness(thickness: float, support_radius: float, E: float, nu: float) -> float:
     """K_d in N/m of a round plate, simply supported: 4π/3·d³E/((1 − ν)(3 + ν)R²) (P1 (14)); m, Pa."""
     return 4 * math.pi / 3 * thickness**3 / ((1 - nu) * (3 + nu) * support_radius**2) * E

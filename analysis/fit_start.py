@@ -1,0 +1,87 @@
+"""Where a fit begins: parameters from a regression that solves nothing, ringing from a spectrum of what a fit leaves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from analysis.fit_problem import DAMPER, FLOW, LN_E, MODES, T0, V0, Problem
+from analysis.models import plate_stiffness, tip_stiffness
+from analysis.record import Array
+
+_SHARE = 0.1
+"""Of F_M: the regression looks at what is above."""
+_LAG = 0.003
+"""Of the contact's length: C_d/K_d to begin with."""
+_DECAYS = (0.03, 0.07, 0.15, 0.3, 0.7, 1.5)
+"""Of the contact's length."""
+_LOWEST = 5.0
+"""Periods of a ringing in a contact, at the least: what is slower is the contact's own shape."""
+_TOP = 30e3
+"""Hz."""
+_SURE = 30.0
+"""Drop of χ² that noise alone does not give over the frequencies and decays tried."""
+
+
+def start_of(problem: Problem) -> Array:
+    """(p,) parameters to begin with, ringing left out.
+
+    Of the integrals of the record, α = (F/K_i)^(2/3) + c·∫F dt + F/K_d; beside the spring, F = K_i·α^(3/2) + C·v.
+    """
+    w, i = problem.window, problem.impact
+    inside = (w.t > w.start) & (w.t < w.start + w.length)
+    since, F = w.t[inside] - w.start, w.force[inside]
+    J = np.cumsum(F) * w.step
+    v = w.v0.value + i.g * since - J / i.mass
+    alpha = np.cumsum(v) * w.step
+    on = w.kept[inside] & (F > _SHARE * F.max()) & (alpha > 0)
+    F, J, v, alpha = F[on], J[on], v[on], alpha[on]
+    assert i.nu is not None, "the caller has seen to it"
+    x = np.zeros(MODES)
+    x[LN_E], x[V0], x[T0] = np.log(3e9), w.v0.value, w.start
+    if problem.kind == "parallel":
+        K = tip_stiffness(i.tip_radius, 1e9, i.nu)[0]
+        a, b = np.linalg.lstsq(np.column_stack((K * alpha**1.5, v)), F, rcond=None)[0]
+        x[LN_E], x[DAMPER] = np.log(1e9 * max(a, 1e-3)), max(b, 0.0)
+        return x
+    flows = problem.kind != "conservative"
+    bends = problem.kind == "flexed"
+    for _ in range(20):
+        E = np.exp(x[LN_E])
+        K, share = tip_stiffness(i.tip_radius, E, i.nu, i.tip_E, i.tip_nu)
+        pressed, bent = (F / K) ** (2 / 3), np.zeros(F.size)
+        if bends:
+            assert i.thickness is not None
+            assert i.support_radius is not None
+            K_d = plate_stiffness(i.thickness, i.support_radius, E, i.nu)
+            bent, x[DAMPER] = F / K_d, _LAG * w.length * K_d
+        columns = np.column_stack((-2 / 3 * share * pressed - bent, J))[:, : 1 + flows]
+        step = np.linalg.lstsq(columns, alpha - pressed - bent - x[FLOW] * J, rcond=None)[0]
+        x[LN_E] += np.clip(step[0], -1, 1)
+        x[FLOW] += step[1] if flows else 0.0
+        if abs(step[0]) < 1e-4:
+            break
+    x[FLOW] = max(x[FLOW], 0.0)
+    return x
+
+
+def ringing_in(problem: Problem, left: Array, t0: float) -> tuple[float, float, float] | None:
+    """Frequency (Hz), decay (s) and amplitude (N) of the ringing that stands out of what a fit ``left`` (n,) N; None without."""
+    w = problem.window
+    since = w.t - t0
+    on = since > 0
+    left = np.where(w.kept, left, 0.0)[on]
+    since = since[on]
+    size = 1 << int(np.ceil(np.log2(2 * since.size)))
+    frequency = np.fft.rfftfreq(size, w.step)
+    band = (frequency > _LOWEST / w.length) & (frequency < min(_TOP, 0.25 / w.step))
+    if not band.any():
+        return None
+    best = (0.0, 0.0, 0.0, 0.0)
+    for decay in (share * w.length for share in _DECAYS):
+        fading = np.exp(-since / decay)
+        weight = 0.5 * float(fading @ fading)
+        size_at = np.abs(np.fft.rfft(left * fading, size)[band])
+        top = int(np.argmax(size_at))
+        height = float(size_at[top])
+        best = max(best, (height**2 / weight, float(frequency[band][top]), decay, height / weight))
+    return best[1:] if best[0] > _SURE * problem.noise**2 else None
