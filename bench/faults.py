@@ -150,6 +150,7 @@ class Bench:
     def play(self, case: Case, fault: dict[str, Any]) -> Row:
         """A drop with the fault, what it takes to mend it, and what there is then."""
         store, emulator = Store(self.folder / "data"), self.emulator
+        self._let_go(case.wire)  # what the row before has left
         runs, before = set(store.runs()), emulator.do("status")["captured"]
         daq, seconds = self._drop(case.wire, case.step, {"name": case.fault, **fault})
         status = emulator.do("status")
