@@ -31,7 +31,7 @@ class Impact:
     tip_radius, thickness, support_radius : m; nu : 1, Poisson's ratio of the specimen
     v0 : m/s, speed at first contact when given outright; height : m, drop height
     g : m/s²; friction : N, guide friction, against the motion; catcher : the rebounding dart is caught
-    tip_E : Pa, of the tip, None: rigid; tip_nu : 1
+    tip_E : Pa, of the tip, None: rigid; tip_nu : 1; yield_stress : Pa, of the specimen; diameter : m, of a plate
     u_thickness, u_nu, u_tip_radius, u_support_radius,
     u_v0, u_height, u_mass, u_tip_mass : standard uncertainties in the unit of the quantity
     u_gain : 1, relative standard uncertainty of the force scale
@@ -62,6 +62,8 @@ class Impact:
     u_support_radius: float = 0.0
     tip_E: float | None = None
     tip_nu: float = 0.3
+    yield_stress: float | None = None
+    diameter: float | None = None
 
     @property
     def g_falling(self) -> float:

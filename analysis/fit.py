@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.conditions import Impact
-from analysis.events import Events, locate
+from analysis.events import locate
 from analysis.findings import Answer
 from analysis.fit_problem import MODES, T0, Problem
 from analysis.fit_start import ringing_in, start_of
@@ -74,7 +74,7 @@ def fit_record(record: Record, impact: Impact, kind: Kind | None = None) -> Fit:
     _allowed(impact, kind)
     window = window_of(record, events, v0)
     _closes(window, impact)
-    return fit_window(window, impact, events, kind)
+    return fit_window(window, impact, kind)
 
 
 def _allowed(impact: Impact, kind: Kind) -> None:
@@ -107,7 +107,7 @@ def _closes(window: Window, impact: Impact) -> None:
         )
 
 
-def fit_window(window: Window, impact: Impact, events: Events | None, kind: Kind) -> Fit:
+def fit_window(window: Window, impact: Impact, kind: Kind) -> Fit:
     """Fit ``kind`` to a window; as `fit_record`."""
     problem = Problem(kind, impact, window, window.noise)
     first = start_of(problem)
@@ -122,7 +122,7 @@ def fit_window(window: Window, impact: Impact, events: Events | None, kind: Kind
         if np.abs(better.residuals[window.t.size + 2 :]).max() > _UNRESTED:
             # A ringing that does not begin at rest has taken the contact's beginning for its own.
             starts = [np.concatenate((x[:T0], [x[T0] + shift / found[0]], x[T0 + 1 :])) for shift in _SHIFTS]
-            better = min(better, *(_minimised(more, start) for start in starts), key=lambda o: o.chi2)
+            better = min([better, *(_minimised(more, start) for start in starts)], key=_chi2)
         if best.chi2 - better.chi2 < _WORTH * max(1.0, better.chi2 / window.t.size):
             break
         problem, best = more, better
@@ -141,6 +141,10 @@ def fit_window(window: Window, impact: Impact, events: Events | None, kind: Kind
     return Fit(problem, best, widened)
 
 
+def _chi2(optimum: Optimum) -> float:
+    return optimum.chi2
+
+
 def _minimised(problem: Problem, x: Array) -> Optimum:
     return minimise(problem.residuals, x, problem.free, *problem.bounds())
 
@@ -154,5 +158,3 @@ def _along(left: Array) -> float:
     ends = np.flatnonzero(rho <= 0)
     total = 1 + 2 * float(rho[: ends[0] if ends.size else rho.size].sum())
     return float(np.sqrt(total)) if total > _ALONG else 1.0
-
-

@@ -1,8 +1,8 @@
-"""What a fit says of each parameter: value, standard error, 95 % interval, and whether the record can tell it at all."""
+"""What a fit says of each parameter: value, standard error, 95 % interval, and whether the record can tell it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -100,7 +100,7 @@ def parameters(fit: Fit) -> dict[str, Parameter]:
     u = np.sqrt(np.diag(C))
     window = problem.window
     E, u_lnE = float(np.exp(x[LN_E])), float(u[LN_E])
-    ends = (E * np.exp(-LEVEL_95 * u_lnE), E * np.exp(LEVEL_95 * u_lnE))
+    ends = (E * math.exp(-LEVEL_95 * u_lnE), E * math.exp(LEVEL_95 * u_lnE))
     found = {"E": Parameter(E, "Pa", E * u_lnE, *ends, DETERMINED if u_lnE < _UNSURE else NOT)}
     J = problem.impact.mass * window.v0.value
     if problem.free[FLOW]:
@@ -131,8 +131,11 @@ def _in_series(c: float, u: float, lo: float | None, hi: float | None, most: flo
     """C_i = 1/c: its ends are those of c, the other way round."""
     value = 1 / c if c > 0 else None
     verdict = NOT if hi is None or hi > most else DETERMINED if lo is not None and lo > 0 else LOWER
-    over: Callable[[float | None], float | None] = lambda end: 1 / end if end is not None and end > 0 else None  # noqa: E731
-    return Parameter(value, "kg/s", u / c**2 if c > 0 else None, over(hi), over(lo), verdict)
+    return Parameter(value, "kg/s", u / c**2 if c > 0 else None, _over(hi), _over(lo), verdict)
+
+
+def _over(c: float | None) -> float | None:
+    return 1 / c if c is not None and c > 0 else None
 
 
 def _damper(value: float, u: float, lo: float | None, hi: float | None, most: float) -> Parameter:

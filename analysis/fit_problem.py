@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.conditions import Impact
 from analysis.fit_window import Window
@@ -21,6 +22,7 @@ LN_E, FLOW, DAMPER, V0, T0, LEVEL, MODES = range(7)
 PER_MODE = 4
 _FROM_REST = 0.2
 """Of its amplitude: what the cosine of a ringing may be; the sensor is at rest before contact."""
+Flags = NDArray[np.bool_]
 FREE: dict[Kind, tuple[int, ...]] = {
     "conservative": (LN_E,),
     "series": (LN_E, FLOW),
@@ -48,7 +50,7 @@ class Problem:
     modes: tuple[float, ...] = ()
 
     @property
-    def free(self) -> np.ndarray:
+    def free(self) -> Flags:
         """(p,) bool: parameters that are fitted."""
         on = np.zeros(MODES + PER_MODE * len(self.modes), dtype=bool)
         on[list(FREE[self.kind])] = True
@@ -103,7 +105,7 @@ class Problem:
         """
         since = np.maximum(t - x[T0], 0.0)
         omega = 2 * np.pi * x[k + 2]
-        wave: np.ndarray = np.exp((-np.exp(-x[k + 3]) + 1j * omega) * since)
+        wave: NDArray[np.complex128] = np.exp((-np.exp(-x[k + 3]) + 1j * omega) * since)
         fading = np.exp(-omega * since)
         on = t > x[T0]
         sine, cosine = wave.imag, wave.real * (1 - fading)
@@ -148,3 +150,7 @@ class Problem:
     def with_mode(self, x: Array, frequency: float, decay: float, amplitude: float) -> tuple[Problem, Array]:
         """One ringing mode more, without its amplitude in x yet."""
         return replace(self, modes=(*self.modes, amplitude)), np.concatenate((x, [0.0, 0.0, frequency, np.log(decay)]))
+
+
+if __name__ == "__main__":  # at set-up: compiled once, read from its cache ever after
+    compiled()(np.array([1.0, 9.8, 0.0, 1e8, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0]), np.zeros(1), np.zeros(1), np.zeros((1, 5)))

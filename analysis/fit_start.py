@@ -1,4 +1,4 @@
-"""Where a fit begins: parameters from a regression that solves nothing, ringing from a spectrum of what a fit leaves."""
+"""Where a fit begins: parameters by a regression that solves nothing, ringing by the spectrum of what is left."""
 
 from __future__ import annotations
 
@@ -29,26 +29,26 @@ def start_of(problem: Problem) -> Array:
     """
     w, i = problem.window, problem.impact
     inside = (w.t > w.start) & (w.t < w.start + w.length)
-    since, F = w.t[inside] - w.start, w.force[inside]
-    J = np.cumsum(F) * w.step
-    v = w.v0.value + i.g * since - J / i.mass
-    alpha = np.cumsum(v) * w.step
-    on = w.kept[inside] & (F > _SHARE * F.max()) & (alpha > 0)
-    F, J, v, alpha = F[on], J[on], v[on], alpha[on]
+    since, pushed = w.t[inside] - w.start, w.force[inside]
+    impulse = np.cumsum(pushed) * w.step
+    speed = w.v0.value + i.g * since - impulse / i.mass
+    depth = np.cumsum(speed) * w.step
+    on = w.kept[inside] & (pushed > _SHARE * pushed.max()) & (depth > 0)
+    F, J, v, alpha = pushed[on], impulse[on], speed[on], depth[on]
     assert i.nu is not None, "the caller has seen to it"
     x = np.zeros(MODES)
     x[LN_E], x[V0], x[T0] = np.log(3e9), w.v0.value, w.start
     if problem.kind == "parallel":
-        K = tip_stiffness(i.tip_radius, 1e9, i.nu)[0]
-        a, b = np.linalg.lstsq(np.column_stack((K * alpha**1.5, v)), F, rcond=None)[0]
+        per_GPa = tip_stiffness(i.tip_radius, 1e9, i.nu)[0]
+        a, b = np.linalg.lstsq(np.column_stack((per_GPa * alpha**1.5, v)), F, rcond=None)[0]
         x[LN_E], x[DAMPER] = np.log(1e9 * max(a, 1e-3)), max(b, 0.0)
         return x
     flows = problem.kind != "conservative"
     bends = problem.kind == "flexed"
     for _ in range(20):
-        E = np.exp(x[LN_E])
-        K, share = tip_stiffness(i.tip_radius, E, i.nu, i.tip_E, i.tip_nu)
-        pressed, bent = (F / K) ** (2 / 3), np.zeros(F.size)
+        E = float(np.exp(x[LN_E]))
+        stiffness, share = tip_stiffness(i.tip_radius, E, i.nu, i.tip_E, i.tip_nu)
+        pressed, bent = (F / stiffness) ** (2 / 3), np.zeros(F.size)
         if bends:
             assert i.thickness is not None
             assert i.support_radius is not None
@@ -65,7 +65,7 @@ def start_of(problem: Problem) -> Array:
 
 
 def ringing_in(problem: Problem, left: Array, t0: float) -> tuple[float, float, float] | None:
-    """Frequency (Hz), decay (s) and amplitude (N) of the ringing that stands out of what a fit ``left`` (n,) N; None without."""
+    """Frequency (Hz), decay (s) and amplitude (N) of the ringing in what a fit ``left`` (n,) N; None without."""
     w = problem.window
     since = w.t - t0
     on = since > 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.events import Events
 from analysis.record import Array, Record
@@ -22,14 +23,15 @@ _NEAR_RAIL = 3
 @dataclass(frozen=True)
 class Window:
     """t, force : (n,) s on the record's axis and N (zero level, droop and tip mass corrected), means of ``block``
-    samples, evenly spaced every ``step`` s; noise : N, of such a mean; level, u_level : N, zero level that was taken off (of the sensor), and what it may be off
+    samples, evenly spaced every ``step`` s; noise : N, of such a mean
+    level, u_level : N, zero level that was taken off (of the sensor), and what it may be off
     kept : (n,) bool, points that are valid; start : s, first contact as found; length : s, of the contact
     v0 : speed at contact; left_out : why points are not valid, in words, or None
     """
 
     t: Array
     force: Array
-    kept: np.ndarray
+    kept: NDArray[np.bool_]
     step: float
     block: int
     noise: float
@@ -56,7 +58,7 @@ def window_of(record: Record, events: Events, v0: Speed) -> Window:
     block = max(1, int(length / dt) // _CONTACT_POINTS)
     n = (stop - first) // block
     part = slice(first, first + n * block)
-    railed = _railed(record, events)[part].reshape(n, block).any(axis=1)
+    railed: NDArray[np.bool_] = np.any(_railed(record, events)[part].reshape(n, block), axis=1)
     left_out = f"{int(railed.sum()) * block} samples at the end of the range were left out" if railed.any() else None
     return Window(
         t=t[part].reshape(n, block).mean(axis=1),
@@ -75,7 +77,7 @@ def window_of(record: Record, events: Events, v0: Speed) -> Window:
     )
 
 
-def _railed(record: Record, events: Events) -> np.ndarray:
+def _railed(record: Record, events: Events) -> NDArray[np.bool_]:
     """(n,) of the samples of ``events``: at an end of the range, or beside one."""
     raw = record.force[events.first : events.first + events.force.size]
     if record.rails is None:

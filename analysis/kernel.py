@@ -13,6 +13,9 @@ The file stands alone: numba caches a function by its own file and does not see 
 NUMBA_DISABLE_JIT=1 it runs as plain Python, which is one of its tests.
 """
 
+# pyright: basic
+# numba infers the types of what it compiles, and has none of its own.
+
 import math
 
 import numpy as np
@@ -84,7 +87,7 @@ def _matrices(h, m, c, q, theta, C, B, P, X):
 
 @njit(cache=True)
 def _stages(h, v, delta, alpha, m, g, K, theta, B, P, A, G, G1, R, M, lag, over, inverse):
-    """Newton over the stages A (3,) of α₁, from what is in A; leaves G, dG/dα and the inverse Jacobian. True if done."""
+    """Newton over the stages A (3,) of α₁, from what is in A; leaves G, dG/dα, the inverse Jacobian. True if done."""
     for i in range(3):
         known = delta + theta * (v + h * g * _C[i])
         for j in range(3):

@@ -6,86 +6,80 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.record import Array
 
 Residuals = Callable[[Array], tuple[Array, Array]]
 _MOST = 60
 _DONE = 1e-7
-"""Relative: a step that would lower the sum of squares by less than this share of it, or of 1, is the last."""
+"""A step that would lower the weighted sum of squares by less than ten times this is not taken."""
 
 
 @dataclass(frozen=True)
 class Optimum:
-    """x : (p,) the best point; chi2 : sum of squares there; N : (p, p) JᵀJ; gradient : (p,) Jᵀr; at_bound : (p,) bool;
+    """x : (p,) the best point; chi2 : sum of squares there; N : (p, p) JᵀJ; at_bound : (p,) bool
     residuals : (n,); J : (n, p); solves : of the model; converged : bool
     """
 
     x: Array
     chi2: float
     N: Array
-    gradient: Array
-    at_bound: np.ndarray
+    at_bound: NDArray[np.bool_]
     residuals: Array
     J: Array
     solves: int
     converged: bool
 
 
-def minimise(residuals: Residuals, x: Array, free: np.ndarray, low: Array, high: Array) -> Optimum:
+def minimise(residuals: Residuals, x: Array, free: NDArray[np.bool_], low: Array, high: Array) -> Optimum:
     """From ``x`` (p,) along the ``free`` (p,) parameters within ``low``, ``high``."""
     x = np.clip(x, low, high)
-    r, J = residuals(x)
-    chi2, damping, solves, converged = float(r @ r), 1e-4, 1, False
+    here, damping, solves, converged = residuals(x), 1e-4, 1, False
+    chi2 = float(here[0] @ here[0])
     while solves < _MOST and not converged:
-        N, gradient = J.T @ J, J.T @ r
-        downhill = ~(((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0)))
-        step_on = free & downhill
-        accepted = False
-        while solves < _MOST:
-            step = _step(N, gradient, step_on, damping)
-            trial = np.clip(x + step, low, high)
-            step = trial - x
-            gain = -(2 * gradient @ step + step @ N @ step)
-            if not gain > _DONE * min(1.0, max(chi2, 1e-12)) * 10:
+        normal, gradient = here[1].T @ here[1], here[1].T @ here[0]
+        held = ((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0))
+        better = None
+        while better is None and solves < _MOST and damping < 1e10:
+            trial = np.clip(x + _step(normal, gradient, free & ~held, damping), low, high)
+            gain = float(-(2 * gradient + normal @ (trial - x)) @ (trial - x))
+            if not gain > 10 * _DONE:
                 converged = True
                 break
-            new_r, new_J = residuals(trial)
+            there = residuals(trial)
             solves += 1
-            new = float(new_r @ new_r)
-            if np.isfinite(new) and new < chi2:
-                accepted = True
+            new = float(there[0] @ there[0])
+            if new < chi2:
+                better = trial, there, new
                 damping = max(damping * (0.1 if chi2 - new > 0.5 * gain else 1.0), 1e-12)
-                break
-            damping = max(damping * 10, 1e-6)
-            if damping > 1e10:
-                break
-        if not accepted:
+            else:
+                damping = max(damping * 10, 1e-6)
+        if better is None:
             break
-        converged = chi2 - new < _DONE * min(1.0, new)
-        x, r, J, chi2 = trial, new_r, new_J, new
-    N, gradient = J.T @ J, J.T @ r
+        x, here, chi2 = better
+    normal, gradient = here[1].T @ here[1], here[1].T @ here[0]
     at_bound = free & (((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0)))
-    return Optimum(x, chi2, N, gradient, at_bound, r, J, solves, converged)
+    return Optimum(x, chi2, normal, at_bound, here[0], here[1], solves, converged)
 
 
-def _step(N: Array, gradient: Array, on: np.ndarray, damping: float) -> Array:
+def _step(normal: Array, gradient: Array, on: NDArray[np.bool_], damping: float) -> Array:
     step = np.zeros(gradient.size)
     at = np.flatnonzero(on)
     if at.size:
-        part = N[np.ix_(at, at)]
+        part = normal[np.ix_(at, at)]
         scale = np.sqrt(np.maximum(np.diag(part), 1e-300))
         scaled = part / np.outer(scale, scale) + damping * np.eye(at.size)
         step[at] = -np.linalg.lstsq(scaled, gradient[at] / scale, rcond=1e-14)[0] / scale
     return step
 
 
-def covariance(N: Array, on: np.ndarray) -> Array:
-    """(p, p) inverse of N over the parameters that are ``on``, 0 elsewhere."""
+def covariance(normal: Array, on: NDArray[np.bool_]) -> Array:
+    """(p, p) inverse of JᵀJ over the parameters that are ``on``, 0 elsewhere."""
     at = np.flatnonzero(on)
-    out = np.zeros_like(N)
+    out = np.zeros_like(normal)
     if at.size:
-        part = N[np.ix_(at, at)]
+        part = normal[np.ix_(at, at)]
         scale = np.sqrt(np.maximum(np.diag(part), 1e-300))
         out[np.ix_(at, at)] = np.linalg.pinv(part / np.outer(scale, scale), rcond=1e-13) / np.outer(scale, scale)
     return out

@@ -3,8 +3,10 @@
 from importlib.metadata import version
 from typing import Any
 
-from analysis import Kinematics, analyze, kinematics
+from analysis import Impact, Kinematics, Record, analyze, kinematics
 from analysis.findings import UNITS
+from analysis.models import Kind
+from api.fitting import fitted
 from api.join import impact_of, record_of
 from daq.errors import StoreError
 from daq.run import RunData
@@ -34,16 +36,21 @@ def answer_of(store: Store, run: str) -> dict[str, Any]:
     return answer
 
 
-def analysed(run: RunData) -> dict[str, Any]:
-    """What the record of a run says; a failure of the analysis is a warning in it."""
-    head = {"run": run.run, "series": run.series}
-    settings = {"g": run.g, "g_source": run.g_source}
+def analysed(run: RunData, model: Kind | None = None, fit: bool = True) -> dict[str, Any]:
+    """What the record of a run says; a failure of the analysis is a warning in it.
+
+    model : another than the support's; fit : False leaves the model out
+    """
+    by_model: dict[str, Any] | None = None
     try:
         record, first = record_of(run)
-        found: dict[str, Any] = analyze(record, impact_of(run)).to_json()
+        impact = impact_of(run)
+        found: dict[str, Any] = analyze(record, impact).to_json()
         for symbol in ON_THE_RECORDS_AXIS:
             if found["findings"][symbol]["value"] is not None:
                 found["findings"][symbol]["value"] += first * run.dt
+        if fit:
+            by_model = _with_model(found, record, impact, run, first, model)
     except Exception as e:  # a run is never dropped because its analysis failed: the answer says that it did
         text = f"the analysis failed ({type(e).__name__}: {e}); the record is safe"
         found = {
@@ -56,7 +63,26 @@ def analysed(run: RunData) -> dict[str, Any]:
         )
         found["warnings"].insert(0, {"code": "partial-record", "text": text})
     found["warnings"] += run.provenance.get("told", [])
-    return {**head, "findings": found["findings"], "fit": None, "warnings": found["warnings"], "settings": settings}
+    settings = {"g": run.g, "g_source": run.g_source}
+    return {
+        "run": run.run, "series": run.series, "findings": found["findings"], "fit": by_model,
+        "warnings": found["warnings"], "settings": settings,
+    }  # fmt: skip
+
+
+def _with_model(
+    found: dict[str, Any], record: Record, impact: Impact, run: RunData, first: int, model: Kind | None
+) -> dict[str, Any] | None:
+    """The fit; what comes of it is put into ``found``."""
+    try:
+        fit, findings, warnings = fitted(record, impact, run.test, first * run.dt, model)
+    except Exception as e:  # as above
+        text = f"the fit failed ({type(e).__name__}: {e}); the findings without a model stand"
+        found["warnings"].append({"code": "fit-failed", "text": text})
+        return None
+    found["findings"] |= findings
+    found["warnings"] += warnings
+    return fit
 
 
 def kinematics_of(run: RunData) -> Kinematics:

@@ -60,7 +60,7 @@ def preliminary(event: Event, rig_path: Path, test_path: Path) -> Event:
     run = _as_run(rig, test, channels, header.interval_ns * 1e-9)
     first = header.first_sample_ns + start * header.interval_ns
     edges = tuple(event["gate_edges_ns"])
-    answer = analysed(replace(run, run=event["run"], first_sample_ns=first, gate_edges_ns=edges))
+    answer = analysed(replace(run, run=event["run"], first_sample_ns=first, gate_edges_ns=edges), fit=False)
     return {"event": "preliminary", "at": now(), **{key: answer[key] for key in ("run", "findings", "warnings")}}
 
 

@@ -6,6 +6,9 @@ from typing import Any
 import numpy as np
 
 from analysis.contact_solver import Solution
+from analysis.fit import Fit
+from analysis.fit_answer import curves
+from analysis.fit_profile import CUT, elements_of, profile, profiled
 from analysis.predict import elements
 from daq.errors import StoreError
 
@@ -44,8 +47,56 @@ def save_model(solution: Solution, path: Path) -> None:
     apart.set(xlabel="Time from contact (ms)", ylabel="Displacement (mm)")
     apart.legend(frameon=False)
     for axes in (time, loop, apart):
-        axes.spines[["top", "right"]].set_visible(False)
-        axes.grid(color="0.9", linewidth=0.6)
+        _plain(axes)
+    _save(figure, path)
+
+
+def save_fit(fit: Fit, path: Path) -> None:
+    """A record with its model and what is left, the loop, the elements apart, and the profiles of the parameters.
+
+    Raises
+    ------
+    StoreError : the file cannot be written.
+    """
+    from matplotlib.figure import Figure  # half a second to load
+
+    c = curves(fit)
+    parts, t = elements_of(fit, POINTS)
+    names = profiled(fit)
+    figure = Figure(figsize=(10, 7.2), layout="constrained")
+    rows: Any = figure.subfigures(2, 1, height_ratios=(3, 2.2))
+    (time, loop), (left, apart) = rows[0].subplots(2, 2, height_ratios=(2, 1.2))
+    time.plot(c["t"] * 1e3, c["force"], color="0.65", linewidth=0.8, label="record")
+    time.plot(c["t"] * 1e3, c["model"], label=f"{fit.problem.kind} model", **STYLES[0])
+    time.set(ylabel="Contact force (N)")
+    time.legend(frameon=False)
+    left.plot(c["t"] * 1e3, c["left"], color="0.3", linewidth=0.6)
+    left.set(xlabel="Time from contact (ms)", ylabel="Left (N)")
+    loop.plot(parts["alpha"] * 1e3, parts["F"], **STYLES[0])
+    loop.set(xlabel="Displacement α (mm)", ylabel="Model force (N)", ylim=(0, None))
+    labels = {"alpha": "α", "alpha_1": "α₁ contact", "alpha_2": "α₂ dashpot", "alpha_3": "α₃ plate"}
+    for (key, label), style in zip(labels.items(), STYLES, strict=True):
+        if float(np.abs(parts[key]).max()) > 0:
+            apart.plot(t * 1e3, parts[key] * 1e3, label=label, **style)
+    apart.set(xlabel="Time from contact (ms)", ylabel="Displacement (mm)")
+    apart.legend(frameon=False, fontsize="small")
+    axes = rows[1].subplots(1, len(names), squeeze=False)[0]
+    for each, name in zip(axes, names, strict=True):
+        value, rise, unit = profile(fit, name)
+        each.plot(value, rise, **STYLES[0])
+        each.axhline(CUT, **STYLES[3])
+        each.set(xlabel=f"{name} ({unit})", ylabel="Rise of χ²", ylim=(0, 9))
+    for each in (time, loop, left, apart, *axes):
+        _plain(each)
+    _save(figure, path)
+
+
+def _plain(axes: Any) -> None:
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(color="0.9", linewidth=0.6)
+
+
+def _save(figure: Any, path: Path) -> None:
     try:
         figure.savefig(path, dpi=160)
     except OSError as e:

@@ -86,6 +86,14 @@ def impact_of(run: RunData) -> Impact:
         ),
         u_mass=test.dart.u.get("mass_kg", 0.0),
         u_tip_mass=test.dart.u.get("tip_mass_kg", 0.0),
+        u_thickness=(_scaled(test.specimen, "thickness_mm", 1e-3) or 0.0),
+        u_nu=test.specimen.u.get("nu", 0.0),
+        u_tip_radius=(_scaled(test.dart, "tip_radius_mm", 1e-3) or 0.0),
+        u_support_radius=(_scaled(test.support, "radius_mm", 1e-3) or 0.0),
+        tip_E=None if test.dart.tip_E_GPa is None else test.dart.tip_E_GPa * 1e9,
+        tip_nu=test.dart.tip_nu,
+        yield_stress=None if test.specimen.yield_MPa is None else test.specimen.yield_MPa * 1e6,
+        diameter=None if test.specimen.diameter_mm is None else test.specimen.diameter_mm * 1e-3,
         u_gain=math.fabs(scale.u.get("counts_to_unit", 0.0) / scale.scale),
     )
 

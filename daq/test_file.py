@@ -50,6 +50,8 @@ class Dart(Table):
     tip_radius_mm: Positive
     tip_mass_kg: NotNegative = 0.0
     range_N: Positive | None = None
+    tip_E_GPa: Positive | None = None
+    tip_nu: Annotated[float, Field(gt=-1, lt=0.5)] = 0.3
 
     @model_validator(mode="after")
     def _tip_is_part_of_the_dart(self) -> "Dart":
@@ -67,6 +69,7 @@ class Specimen(Table):
     diameter_mm: Positive | None = None
     stack_mm: list[Positive] | None = None
     E_static_GPa: Positive | None = None
+    yield_MPa: Positive | None = None
 
 
 class Support(Table):

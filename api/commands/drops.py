@@ -5,9 +5,10 @@ from typing import Annotated, Any
 
 import typer
 
-from api.commands.options import Data, Json, Series, TestFileOption
+from api.commands.options import Data, Json, Kind, Series, TestFileOption, checked_figure
 from api.commands.show import print_answer, print_json, tell
 from daq.errors import DaqError, StoreError
+from daq.run import RunData
 
 
 def import_files(
@@ -55,21 +56,33 @@ def analyze(
     data: Data,
     runs: Annotated[list[str] | None, typer.Argument(help="Runs to analyse.", metavar="RUN...")] = None,
     everything: Annotated[bool, typer.Option("--all", help="All runs of the folder.")] = False,
+    model: Annotated[
+        Kind | None, typer.Option("--model", help="Fit this one, not that of the support; the answer is not kept.")
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option("--plot", help="FILE.png or FILE.svg of one run and its fit.", metavar="FILE")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Work out what the records say, and keep the answers beside them."""
-    from api.answer import answer_of
+    from api.answer import analysed, answer_of
     from daq.store import Store
 
     if bool(runs) == everything:
         raise typer.BadParameter("give runs, or --all")
+    if plot is not None:
+        checked_figure(plot)
+        if runs is None or len(runs) != 1:
+            raise typer.BadParameter("--plot draws one run", param_hint="--plot")
     store = Store(data)
     if not data.is_dir():
         raise StoreError(f"no data folder {data}")
     failed = False
     for run in store.runs() if everything else runs or []:
         try:
-            answer = answer_of(store, run)
+            answer = answer_of(store, run) if model is None else analysed(store.read(run), model.value)
+            if plot is not None:
+                _draw(store.read(run), model, plot)
         except DaqError as e:
             failed = True
             tell(f"droptower: {e}")
@@ -80,6 +93,20 @@ def analyze(
             print_answer(answer)
     if failed:
         raise typer.Exit(1)
+
+
+def _draw(run: RunData, model: Kind | None, path: Path) -> None:
+    from analysis.fit import NotFitted
+    from api.figures import save_fit
+    from api.fitting import fit_of
+
+    try:
+        fit = fit_of(run, None if model is None else model.value)
+    except NotFitted as e:
+        tell(f"droptower: nothing is drawn: {e}")
+        return
+    save_fit(fit, path)
+    tell(f"drawn in {path}")
 
 
 def export(

@@ -29,7 +29,9 @@ def acquire(
 ) -> None:
     """Arm the rig, take one drop, make it safe, and say what it shows."""
     from api.early import start
+    from api.fitting import warm
 
+    warm()
     if not again and sys.stdin.isatty():
         again = _asked(test, data)
     _take(start(rig, test, data, series, spare, again), data, as_json)

@@ -1,22 +1,12 @@
 """`droptower model`: the findings of a predicted drop, and its picture."""
 
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from api.commands.options import Json
+from api.commands.options import Json, Kind, checked_figure
 from api.commands.show import print_answer, print_json, tell
-
-
-class Kind(StrEnum):
-    """The models of PHYSICS.md."""
-
-    conservative = "conservative"
-    parallel = "parallel"
-    series = "series"
-    flexed = "flexed"
 
 
 def model(
@@ -45,8 +35,8 @@ def model(
     from analysis.predict import predict
 
     _fit(kind, C, Ci, Cd, thickness_mm, support_radius_mm)
-    if plot is not None and plot.suffix not in (".png", ".svg"):
-        raise typer.BadParameter(f"{plot} ends in neither .png nor .svg", param_hint="--plot")
+    if plot is not None:
+        checked_figure(plot)
     for name, value, low, high in (("--tip-radius-mm", tip_radius_mm, 0, 1e4), ("--E-GPa", E_GPa, 0, 1e5)):
         if not low < value < high:
             raise typer.BadParameter(f"has to be above {low} and below {high:g}, not {value:g}", param_hint=name)

@@ -1,5 +1,6 @@
 """Options that several commands take."""
 
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -10,3 +11,18 @@ Json = Annotated[bool, typer.Option("--json", help="One JSON object a line on st
 Series = Annotated[str | None, typer.Option("--series", help="Series that the run belongs to.", metavar="NAME")]
 RigFileOption = Annotated[Path, typer.Option("--rig", help="Rig file.", metavar="RIG.toml")]
 TestFileOption = Annotated[Path, typer.Option("--test", help="Test file.", metavar="TEST.toml")]
+
+
+class Kind(StrEnum):
+    """The models of PHYSICS.md."""
+
+    conservative = "conservative"
+    parallel = "parallel"
+    series = "series"
+    flexed = "flexed"
+
+
+def checked_figure(path: Path) -> None:
+    """Refuse a figure file of another kind."""
+    if path.suffix not in (".png", ".svg"):
+        raise typer.BadParameter(f"{path} ends in neither .png nor .svg", param_hint="--plot")

@@ -7,7 +7,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-EDGE = {"m": ("mm", 1e3), "s": ("ms", 1e3), "1": ("", 1.0)}
+EDGE = {"Pa": ("GPa", 1e-9), "m": ("mm", 1e3), "s": ("ms", 1e3), "1": ("", 1.0)}
 """Units at the edge, and the factor to them."""
 
 
@@ -46,11 +46,24 @@ def print_answer(answer: dict[str, Any]) -> None:
         table.add_row(symbol, value_with_u(finding["value"], finding["u"], factor), unit)
     console = Console()
     console.print(table)
+    if answer["fit"] is not None:
+        console.print(_fit_table(answer["fit"]))
     unknown = [s for s, f in answer["findings"].items() if f["value"] is None]
     if unknown:
         console.print(f"not known: {', '.join(unknown)}", highlight=False)
     for warning in answer["warnings"]:
         console.print(f"! {warning['code']}: {warning['text']}", highlight=False, markup=False)
+
+
+def _fit_table(fit: dict[str, Any]) -> Table:
+    table = Table(title=f"{fit['model']} model", title_justify="left")
+    for title in ("parameter", "value ± standard uncertainty", "95 %", "unit", "verdict"):
+        table.add_column(title)
+    for name, p in fit["parameters"].items():
+        unit, factor = EDGE.get(p["unit"], (p["unit"], 1.0))
+        lo, hi = (f"{p[end] * factor:.4g}" if p[end] is not None else "…" for end in ("lo", "hi"))
+        table.add_row(name, value_with_u(p["value"], p["u_total"], factor), f"{lo} to {hi}", unit, p["verdict"])
+    return table
 
 
 def findings_in_line(findings: dict[str, Any], symbols: tuple[str, ...]) -> str:

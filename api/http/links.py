@@ -20,6 +20,7 @@ def of_run(run: str) -> dict[str, str]:
         "force": f"{own}/force",
         "envelope": f"{own}/envelope",
         "contact": f"{own}/contact",
+        "fit": f"{own}/fit",
         "raw": f"{own}/raw",
         "csv": f"{own}/export?format=csv",
         "h5": f"{own}/export?format=h5",

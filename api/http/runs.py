@@ -9,7 +9,7 @@ from fastapi import APIRouter, Depends, Query, Request
 from fastapi.responses import FileResponse, JSONResponse, Response
 from starlette.background import BackgroundTask
 
-from api.answer import answer_of
+from api.answer import analysed, answer_of
 from api.http import links
 from api.http.caching import tag, tag_of_folder, tagged, unchanged
 from api.http.queries import cursor, moment, only_known
@@ -89,6 +89,22 @@ def _flat(table: dict[str, Any]) -> dict[str, Any]:
             flat[key] = [_flat(row) for row in value] if key == "channel" else value
             flat |= {f"u_{key}": u[key]} if key in u else {}
     return flat
+
+
+@router.get("/runs/{run}/fit")
+def get_fit(
+    shared: Shared,
+    run: str,
+    model: Annotated[
+        Literal["conservative", "parallel", "series", "flexed"] | None,
+        Query(description="another model than the support's; its answer is not kept"),
+    ] = None,
+) -> Response:
+    """The fitted model: parameters with intervals and verdicts, budget, validity; null where none can be fitted."""
+    data = shared.traces.get(run).run
+    answer = answer_of(shared.store, run) if model is None else analysed(data, model)
+    body = {"run": run, "fit": answer["fit"], "warnings": answer["warnings"], "links": links.of_run(run)}
+    return JSONResponse(plain(body))
 
 
 @router.get("/runs/{run}/raw", response_class=FileResponse)

@@ -13,6 +13,7 @@ from starlette.middleware import Middleware
 from starlette.middleware.body_limit import RequestBodyLimitMiddleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 
+from api.fitting import warm
 from api.http import acquisitions, errors, login, pages, runs, samples
 from api.http.assets import Assets
 from api.http.bench import Bench
@@ -82,6 +83,7 @@ def serve(data: Path, rig: Path | None, host: str, port: int, on_ready: Callable
     ServeError : an address that others reach without token and named hosts, or a port that cannot be had.
     SettingsError : the rig file is wrong.
     """
+    warm()
     token, hosts = _admission(host)
     app = create_app(data, rig, hosts=hosts, token=token)
     listener = _bound(host, port)
