@@ -32,7 +32,11 @@ def number(low: float, high: float, default: float | None, *, whole: bool = Fals
 
 @dataclass(frozen=True)
 class Specimen:
-    """The specimen and its support; "ring" is a plate free to bend, "rigid" a half-space (PHYSICS.md, Models)."""
+    """The specimen and its support; "ring" is a plate free to bend, "rigid" a half-space (PHYSICS.md, Models).
+
+    ``modes`` > 0: the plate has mass, of ``density_kg_m3``, and so many of its modes; ``finite``: the half-space is a
+    layer of ``thickness_mm`` that slides on its base.
+    """
 
     kind: str = field(default="ring", metadata={"choices": ("ring", "rigid")})
     E_GPa: float = number(1e-3, 1000, 3.3)
@@ -43,6 +47,17 @@ class Specimen:
     C_d: float = number(0, 1e6, 10)
     C: float | None = number(1, 1e12, None, optional=True)
     fail_N: float | None = number(1, 1e7, None, optional=True)
+    modes: int = number(0, 6, 0, whole=True)
+    density_kg_m3: float = number(100, 30_000, 1310)
+    modal_damping: float = number(0, 0.5, 0.01)
+    finite: bool = False
+
+    def check(self) -> None:
+        """Refuse what is played one way or the other, not both."""
+        if self.modes and (self.C_d or self.kind != "ring"):
+            raise SettingError("modes are of a plate on a ring without C_d: set kind = 'ring' and C_d = 0 with them")
+        if self.finite and self.kind != "rigid":
+            raise SettingError("finite is of a specimen on a rigid support: set kind = 'rigid' with it")
 
 
 @dataclass(frozen=True)
@@ -193,7 +208,7 @@ def changed(part: Part, changes: dict[str, Any]) -> Part:
         elif values.get("v0") is not None:
             values.setdefault("height_mm", None)
     result = replace(part, **values)
-    if isinstance(result, Dart | Gate | Hang):
+    if isinstance(result, Specimen | Dart | Gate | Hang):
         result.check()
     return result
 
