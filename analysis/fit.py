@@ -13,7 +13,7 @@ import numpy as np
 from analysis.conditions import Impact
 from analysis.events import locate
 from analysis.findings import Answer
-from analysis.fit_problem import MODES, T0, Problem
+from analysis.fit_problem import MODES, T0, Corrected, Problem
 from analysis.fit_start import ringing_in, start_of
 from analysis.fit_window import Window, window_of
 from analysis.levenberg import Optimum, minimise
@@ -22,6 +22,8 @@ from analysis.record import Array, Record
 from analysis.restitution import speed_at_contact
 
 _MODES = 2
+_RISING = 0.9
+"""Of a contact that is cut off: where its greatest force may lie, at the latest."""
 _ALONG = 1.5
 """Of white noise: correlation of what is left, past which the intervals are widened by it."""
 _UNRESTED = 1.5
@@ -57,8 +59,10 @@ class Fit:
         return n * float(np.log(left @ left / n)) + int(self.problem.free.sum()) * float(np.log(n))
 
 
-def fit_record(record: Record, impact: Impact, kind: Kind | None = None) -> Fit:
-    """Fit ``kind``, or the model of the support, to a record.
+def fit_record(
+    record: Record, impact: Impact, kind: Kind | None = None, corrections: tuple[Corrected, ...] = ()
+) -> Fit:
+    """Fit ``kind``, or the model of the support, to a record; ``corrections`` of the model are named in its answer.
 
     Raises
     ------
@@ -71,21 +75,29 @@ def fit_record(record: Record, impact: Impact, kind: Kind | None = None) -> Fit:
     if v0 is None:
         raise NotFitted("no model is fitted: the speed at contact is not known; give v0, a drop height or a gate")
     kind = kind or ("flexed" if impact.support == "ring" else "series")
-    _allowed(impact, kind)
+    _allowed(impact, kind, corrections)
     window = window_of(record, events, v0)
     _closes(window, impact)
-    return fit_window(window, impact, kind)
+    return fit_window(window, impact, kind, corrections)
 
 
-def _allowed(impact: Impact, kind: Kind) -> None:
+def _allowed(impact: Impact, kind: Kind, corrections: tuple[Corrected, ...]) -> None:
     if impact.shape != "plate":
         raise NotFitted(f"no model is fitted: the specimen's shape is {impact.shape!r}, the models are of plates")
     wanted = {"tip_radius": impact.tip_radius, "nu": impact.nu}
     if kind == "flexed":
         wanted |= {"thickness": impact.thickness, "support_radius": impact.support_radius}
+    if "overhang" in corrections:
+        if kind != "flexed":
+            raise NotFitted(f"no model is fitted: overhang is a plate's, the {kind} model has none")
+        wanted |= {"diameter": impact.diameter}
+    if "finite-thickness" in corrections:
+        if kind == "flexed":
+            raise NotFitted("no model is fitted: finite thickness is of a specimen on a rigid support, not of a plate")
+        wanted |= {"thickness": impact.thickness}
     for name, value in wanted.items():
         if value is None:
-            raise NotFitted(f"no model is fitted: the {kind} model needs {name}")
+            raise NotFitted(f"no model is fitted: the {kind} model, so corrected, needs {name}")
         if name != "nu" and not value > 0:
             raise NotFitted(f"no model is fitted: {name} has to be above 0, it is {value:g}")
     assert impact.nu is not None
@@ -94,7 +106,11 @@ def _allowed(impact: Impact, kind: Kind) -> None:
 
 
 def _closes(window: Window, impact: Impact) -> None:
-    """An impulse that no contact can have: a unit is wrong."""
+    """An impulse that no contact can have: a unit is wrong. And a record that has not seen the force fall."""
+    if not window.whole and window.t[int(np.argmax(window.force))] > window.start + _RISING * window.length:
+        raise NotFitted(
+            "no model is fitted: the record ends before the force has passed its maximum; record a longer window"
+        )
     if not window.whole or window.left_out is not None:
         return
     inside = (window.t > window.start) & (window.t < window.start + window.length)
@@ -107,9 +123,9 @@ def _closes(window: Window, impact: Impact) -> None:
         )
 
 
-def fit_window(window: Window, impact: Impact, kind: Kind) -> Fit:
+def fit_window(window: Window, impact: Impact, kind: Kind, corrections: tuple[Corrected, ...] = ()) -> Fit:
     """Fit ``kind`` to a window; as `fit_record`."""
-    problem = Problem(kind, impact, window, window.noise)
+    problem = Problem(kind, impact, window, window.noise, corrections=corrections)
     first = start_of(problem)
     best = _minimised(problem, first)
     for _ in range(_MODES):

@@ -29,6 +29,7 @@ def to_json(fit: Fit) -> tuple[dict[str, Any], list[Caution]]:
     cautions = _cautions(fit, known)
     answer: dict[str, Any] = {
         "model": fit.problem.kind,
+        "corrections": list(fit.problem.corrections),
         "parameters": {name: _parameter(name, p, rows) for name, p in known.items()},
         "budget": [_row(row) for row in rows],
         "residual_rms": float(np.sqrt(np.mean(fit.left[fit.problem.window.kept] ** 2))),

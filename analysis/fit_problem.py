@@ -9,19 +9,22 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.conditions import Impact
 from analysis.fit_window import Window
-from analysis.models import Kind, plate_stiffness, tip_stiffness
+from analysis.models import Kind, layer, overhang, plate_stiffness, tip_stiffness
 from analysis.record import Array
 
 LN_E, FLOW, DAMPER, V0, T0, LEVEL, MODES = range(7)
 PER_MODE = 4
 _FROM_REST = 0.2
 """Of its amplitude: what the cosine of a ringing may be; the sensor is at rest before contact."""
+Corrected = Literal["overhang", "finite-thickness"]
+"""What a model can be corrected for."""
 Flags = NDArray[np.bool_]
 FREE: dict[Kind, tuple[int, ...]] = {
     "conservative": (LN_E,),
@@ -48,6 +51,7 @@ class Problem:
     window: Window
     noise: float
     modes: tuple[float, ...] = ()
+    corrections: tuple[Corrected, ...] = ()
 
     @property
     def free(self) -> Flags:
@@ -70,7 +74,7 @@ class Problem:
         return low, high
 
     def constants(self, x: Array) -> Array:
-        """(10,) what the kernel takes."""
+        """(14,) what the kernel takes."""
         i = self.impact
         E, nu = float(np.exp(x[LN_E])), i.nu
         assert nu is not None, "the caller has seen to it"
@@ -80,9 +84,17 @@ class Problem:
             assert i.thickness is not None
             assert i.support_radius is not None
             q = 1 / plate_stiffness(i.thickness, i.support_radius, E, nu)
+            if "overhang" in self.corrections:
+                assert i.diameter is not None
+                q /= overhang(i.diameter / 2, i.support_radius, nu)
         beside = x[DAMPER] if self.kind == "parallel" else 0.0
         lag = x[DAMPER] * q if self.kind == "flexed" else 0.0
-        return np.array([i.mass, i.g, i.friction / i.mass, K, x[FLOW], q, lag, beside, x[V0], share])
+        base = (0.0, 0.0, 0.0, 0.0)
+        if "finite-thickness" in self.corrections:
+            assert i.thickness is not None
+            by = float(np.sqrt(i.tip_radius)) / i.thickness
+            base = tuple(k * by**n for n, k in enumerate(layer(nu), 1))
+        return np.array([i.mass, i.g, i.friction / i.mass, K, x[FLOW], q, lag, beside, x[V0], share, *base])
 
     def contact(self, x: Array, t: Array, slopes: Array | None = None) -> Array:
         """Contact force in N at ``t`` (n,), s on the record's axis; its derivatives into ``slopes`` (n, 5)."""
@@ -153,4 +165,9 @@ class Problem:
 
 
 if __name__ == "__main__":  # at set-up: compiled once, read from its cache ever after
-    compiled()(np.array([1.0, 9.8, 0.0, 1e8, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0]), np.zeros(1), np.zeros(1), np.zeros((1, 5)))
+    compiled()(
+        np.array([1.0, 9.8, 0.0, 1e8, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0]),
+        np.zeros(1),
+        np.zeros(1),
+        np.zeros((1, 5)),
+    )

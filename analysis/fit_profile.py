@@ -6,13 +6,11 @@ import math
 
 import numpy as np
 
-from analysis.contact_solver import solve
 from analysis.fit import Fit
 from analysis.fit_intervals import LEVEL_95, interval, spread
-from analysis.fit_problem import DAMPER, FLOW, LN_E
+from analysis.fit_problem import DAMPER, FLOW, LN_E, T0
+from analysis.kinematics import running
 from analysis.levenberg import minimise
-from analysis.models import Model
-from analysis.predict import elements
 from analysis.record import Array
 
 CUT = LEVEL_95**2
@@ -57,10 +55,26 @@ def profile(fit: Fit, name: str) -> tuple[Array, Array, str]:
 
 
 def elements_of(fit: Fit, points: int) -> tuple[dict[str, Array], Array]:
-    """F, α, α₁, α₂, α₃ of the fitted contact, N and m, and the times from touch, s, each (points − 1,)."""
-    m, g, _, K, c, q, lag, beside, v0, _ = (float(v) for v in fit.problem.constants(fit.best.x))
-    bent = math.inf if q == 0 else 1 / q
-    C_d = 0.0 if q == 0 else lag / q
-    solution = solve(Model(fit.problem.kind, m, K, bent, 1 / c if c > 0 else math.inf, C_d, beside, g), v0)
-    t = np.linspace(0, min(solution.end, float(solution.t[-1])), points)[:-1]
-    return {**elements(solution, t), "alpha": solution.displacement(t)}, t
+    """F, α, α₁, α₂, α₃ of the fitted contact, N and m, and the times from touch, s, each (points,)."""
+    problem, x = fit.problem, fit.best.x
+    constants = problem.constants(x)
+    m, g, c, v0 = (float(constants[k]) for k in (0, 1, 4, 8))
+    t = np.linspace(0, 2 * problem.window.length, 8 * points)
+    F = problem.contact(x, t + x[T0])
+    J = running(F, t)
+    alpha = running(v0 + g * t - J / m, t)
+    alpha_1 = alpha
+    if problem.kind != "parallel":
+        deepest = np.linspace(0, 1.05 * float(alpha.max()), 8 * points)
+        alpha_1 = np.interp(F, spring_of(constants, deepest), deepest)
+    parts = {"F": F, "alpha": alpha, "alpha_1": alpha_1, "alpha_2": c * J, "alpha_3": alpha - alpha_1 - c * J}
+    if problem.kind != "flexed":
+        parts["alpha_3"] = np.zeros(t.size)
+    some = np.linspace(0, int(np.flatnonzero(F > 0)[-1]), points).astype(int)
+    return {key: values[some] for key, values in parts.items()}, t[some]
+
+
+def spring_of(constants: Array, alpha: Array) -> Array:
+    """F in N at α₁ (n,), m: K_i·α^1.5, and what the base under a layer adds."""
+    u = np.sqrt(alpha)
+    return constants[3] * alpha**1.5 * (1 + sum(k * u**n for n, k in enumerate(constants[10:], 1)))

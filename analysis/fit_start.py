@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from analysis.fit_problem import DAMPER, FLOW, LN_E, MODES, T0, V0, Problem
-from analysis.models import plate_stiffness, tip_stiffness
+from analysis.models import overhang, plate_stiffness, tip_stiffness
 from analysis.record import Array
 
 _SHARE = 0.1
@@ -53,6 +53,9 @@ def start_of(problem: Problem) -> Array:
             assert i.thickness is not None
             assert i.support_radius is not None
             K_d = plate_stiffness(i.thickness, i.support_radius, E, i.nu)
+            if "overhang" in problem.corrections:
+                assert i.diameter is not None
+                K_d *= overhang(i.diameter / 2, i.support_radius, i.nu)
             bent, x[DAMPER] = F / K_d, _LAG * w.length * K_d
         columns = np.column_stack((-2 / 3 * share * pressed - bent, J))[:, : 1 + flows]
         step = np.linalg.lstsq(columns, alpha - pressed - bent - x[FLOW] * J, rcond=None)[0]

@@ -61,6 +61,20 @@ def _inverse(M, out):
 
 
 @njit(cache=True)
+def _spring(alpha, K, base):
+    """G and dG/dα₁: K·α^1.5, times 1 + Σ base_n·α^(n/2) over a layer."""
+    if alpha <= 0:
+        return 0.0, 0.0
+    u = math.sqrt(alpha)
+    if base[0] == 0.0:
+        return K * u * u * u, 1.5 * K * u
+    b1, b2, b3, b4 = base
+    more = 1 + u * (b1 + u * (b2 + u * (b3 + u * b4)))
+    by_u = b1 + u * (2 * b2 + u * (3 * b3 + u * 4 * b4))
+    return K * u * u * u * more, K * u * (1.5 * more + 0.5 * u * by_u)
+
+
+@njit(cache=True)
 def _matrices(h, m, c, q, theta, C, B, P, X):
     """B: what the stages of G weigh in the equations of α₁; P: V = P·(v + h·g·c_i − h/m·A·G)."""
     for i in range(3):
@@ -86,7 +100,7 @@ def _matrices(h, m, c, q, theta, C, B, P, X):
 
 
 @njit(cache=True)
-def _stages(h, v, delta, alpha, m, g, K, theta, B, P, A, G, G1, R, M, lag, over, inverse):
+def _stages(h, v, delta, alpha, m, g, K, base, theta, B, P, A, G, G1, R, M, lag, over, inverse):
     """Newton over the stages A (3,) of α₁, from what is in A; leaves G, dG/dα, the inverse Jacobian. True if done."""
     for i in range(3):
         known = delta + theta * (v + h * g * _C[i])
@@ -101,9 +115,7 @@ def _stages(h, v, delta, alpha, m, g, K, theta, B, P, A, G, G1, R, M, lag, over,
         lag[i, i] += 1.0
     for _ in range(25):
         for i in range(3):
-            root = math.sqrt(A[i]) if A[i] > 0 else 0.0
-            G[i] = K * root * root * root
-            G1[i] = 1.5 * K * root
+            G[i], G1[i] = _spring(A[i], K, base)
         for i in range(3):
             for j in range(3):
                 M[i, j] = lag[i, j] + B[i, j] * G1[j]
@@ -121,9 +133,7 @@ def _stages(h, v, delta, alpha, m, g, K, theta, B, P, A, G, G1, R, M, lag, over,
             return False
         if change <= 1e-9 * scale + 1e-18:
             for i in range(3):
-                root = math.sqrt(A[i]) if A[i] > 0 else 0.0
-                G[i] = K * root * root * root
-                G1[i] = 1.5 * K * root
+                G[i], G1[i] = _spring(A[i], K, base)
             return True
     return False
 
@@ -186,12 +196,14 @@ def _cubic(at_0, stages, out):
 def contact(constants, times, force, slopes):
     """Contact force at ``times`` (n,), s from touch, rising, into ``force`` (n,), 0 outside the contact.
 
-    constants : (10,) m kg, g m/s², drag m/s² (friction over mass), K_i N/m^1.5, c s/kg, q m/N, θ s, C kg/s, v0 m/s, and
-    the share of ln E in ln K_i (1 on a rigid tip). slopes : (n, 5) takes the sensitivities in the order of `LN_E` …
+    constants : (14,) m kg, g m/s², drag m/s² (friction over mass), K_i N/m^1.5, c s/kg, q m/N, θ s, C kg/s, v0 m/s, the
+    share of ln E in ln K_i (1 on a rigid tip), and what the base under a layer adds, of √α₁ to its fourth power (0 on a
+    half-space). slopes : (n, 5) takes the sensitivities in the order of `LN_E` …
     `TIME`; (0, 5): none are wanted. Returns the end of contact in s; inf where the dart stays, nan where the constants
     make a contact that cannot be integrated.
     """
-    m, gravity, drag, K, c, q, theta, C, v0, share = constants
+    m, gravity, drag, K, c, q, theta, C, v0, share = constants[:10]
+    base = (constants[10], constants[11], constants[12], constants[13])
     wanted = slopes.shape[0] > 0
     force[:] = 0.0
     slopes[:] = 0.0
@@ -221,7 +233,7 @@ def contact(constants, times, force, slopes):
                 else:
                     A[i] = alpha + _C[i] * h * v
             _matrices(h, m, c, q, theta, C, B, P, X)
-            if not _stages(h, v, delta, alpha, m, g, K, theta, B, P, A, G, G1, R, M, lag, over, inverse):
+            if not _stages(h, v, delta, alpha, m, g, K, base, theta, B, P, A, G, G1, R, M, lag, over, inverse):
                 return math.nan
             for i in range(3):
                 s = 0.0
@@ -235,7 +247,7 @@ def contact(constants, times, force, slopes):
                 if gauge > 0:
                     break
                 parted, g_high = True, gauge
-                g_low = C * v + K * max(alpha, 0.0) ** 1.5 if C > 0 else alpha
+                g_low = C * v + _spring(alpha, K, base)[0] if C > 0 else alpha
             elif gauge > 0:
                 low, g_low, g_high = h, gauge, 0.5 * g_high
             else:
@@ -257,8 +269,11 @@ def contact(constants, times, force, slopes):
             x = (times[at] - t) / h
             a = cubic[0] + x * (cubic[1] + x * (cubic[2] + x * cubic[3]))
             if a > 0 or C > 0:
-                root = math.sqrt(a) if a > 0 else 0.0
-                spring, F1 = K * root * root * root, 1.5 * K * root
+                if base[0] == 0.0:
+                    root = math.sqrt(a) if a > 0 else 0.0
+                    spring, F1 = K * root * root * root, 1.5 * K * root
+                else:
+                    spring, F1 = _spring(a, K, base)
                 force[at] = spring
                 if C > 0:
                     force[at] += C * (speed[0] + x * (speed[1] + x * (speed[2] + x * speed[3])))

@@ -39,6 +39,36 @@ def plate_stiffness(thickness: float, support_radius: float, E: float, nu: float
     return 4 * math.pi / 3 * thickness**3 / ((1 - nu) * (3 + nu) * support_radius**2) * E
 
 
+def overhang(b: float, R: float, nu: float) -> float:
+    """K_d of a plate of radius ``b`` on a ring of radius ``R`` (m) over that of one that ends at the ring.
+
+    w = FR²/(16πD)·[2 + (1 − ν)/(1 + ν)·(R/b)²] (Timoshenko and Woinowsky-Krieger, *Theory of Plates and Shells*, 16).
+    """
+    share = (1 - nu) / (1 + nu)
+    return (2 + share) / (2 + share * (R / max(b, R)) ** 2)
+
+
+def layer(nu: float) -> tuple[float, float, float, float]:
+    """Coefficients of χ … χ⁴, χ = √(r·α₁)/h, in the force of a layer that slides on a rigid base over a half-space's.
+
+    Dimitriadis et al., Biophys. J. 82 (2002) 2798, (15).
+    """
+    a = -0.347 * (3 - 2 * nu) / (1 - nu)
+    b = 0.056 * (5 - 2 * nu) / (1 - nu)
+    pi = math.pi
+    return (
+        -2 * a / pi,
+        4 * a**2 / pi**2,
+        -8 / pi**3 * (a**3 + 4 * pi**2 / 15 * b),
+        16 * a / pi**4 * (a**3 + 3 * pi**2 / 5 * b),
+    )
+
+
+def on_layer(chi: float, nu: float) -> float:
+    """Force on a layer over that on a half-space."""
+    return 1 + sum(k * chi**n for n, k in enumerate(layer(nu), 1))
+
+
 @dataclass(frozen=True)
 class Model:
     """Constants of a contact, SI.

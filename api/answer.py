@@ -5,6 +5,7 @@ from typing import Any
 
 from analysis import Impact, Kinematics, Record, analyze, kinematics
 from analysis.findings import UNITS
+from analysis.fit_problem import Corrected
 from analysis.models import Kind
 from api.fitting import fitted
 from api.join import impact_of, record_of
@@ -36,10 +37,12 @@ def answer_of(store: Store, run: str) -> dict[str, Any]:
     return answer
 
 
-def analysed(run: RunData, model: Kind | None = None, fit: bool = True) -> dict[str, Any]:
+def analysed(
+    run: RunData, model: Kind | None = None, corrections: tuple[Corrected, ...] = (), fit: bool = True
+) -> dict[str, Any]:
     """What the record of a run says; a failure of the analysis is a warning in it.
 
-    model : another than the support's; fit : False leaves the model out
+    model : another than the support's; corrections : of it; fit : False leaves the model out
     """
     by_model: dict[str, Any] | None = None
     try:
@@ -50,7 +53,7 @@ def analysed(run: RunData, model: Kind | None = None, fit: bool = True) -> dict[
             if found["findings"][symbol]["value"] is not None:
                 found["findings"][symbol]["value"] += first * run.dt
         if fit:
-            by_model = _with_model(found, record, impact, run, first, model)
+            by_model = _with_model(found, record, impact, run, first, (model, corrections))
     except Exception as e:  # a run is never dropped because its analysis failed: the answer says that it did
         text = f"the analysis failed ({type(e).__name__}: {e}); the record is safe"
         found = {
@@ -71,11 +74,16 @@ def analysed(run: RunData, model: Kind | None = None, fit: bool = True) -> dict[
 
 
 def _with_model(
-    found: dict[str, Any], record: Record, impact: Impact, run: RunData, first: int, model: Kind | None
+    found: dict[str, Any],
+    record: Record,
+    impact: Impact,
+    run: RunData,
+    first: int,
+    how: tuple[Kind | None, tuple[Corrected, ...]],
 ) -> dict[str, Any] | None:
     """The fit; what comes of it is put into ``found``."""
     try:
-        fit, findings, warnings = fitted(record, impact, run.test, first * run.dt, model)
+        fit, findings, warnings = fitted(record, impact, run.test, first * run.dt, *how)
     except Exception as e:  # as above
         text = f"the fit failed ({type(e).__name__}: {e}); the findings without a model stand"
         found["warnings"].append({"code": "fit-failed", "text": text})

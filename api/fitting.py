@@ -5,6 +5,7 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 from analysis import Impact, Record
+from analysis.fit_problem import Corrected
 from analysis.models import Kind
 from api.join import impact_of, record_of
 from daq.run import RunData
@@ -25,7 +26,7 @@ def warm() -> None:
     threading.Thread(target=load, name="kernel", daemon=True).start()
 
 
-def fit_of(run: RunData, kind: Kind | None = None) -> "Fit":
+def fit_of(run: RunData, kind: Kind | None = None, corrections: tuple[Corrected, ...] = ()) -> "Fit":
     """The fit of a run, for figures.
 
     Raises
@@ -34,11 +35,16 @@ def fit_of(run: RunData, kind: Kind | None = None) -> "Fit":
     """
     from analysis.fit import fit_record
 
-    return fit_record(record_of(run)[0], impact_of(run), kind)
+    return fit_record(record_of(run)[0], impact_of(run), kind, corrections)
 
 
 def fitted(
-    record: Record, impact: Impact, test: TestFile, shift: float, kind: Kind | None = None
+    record: Record,
+    impact: Impact,
+    test: TestFile,
+    shift: float,
+    kind: Kind | None = None,
+    corrections: tuple[Corrected, ...] = (),
 ) -> tuple[dict[str, Any] | None, dict[str, Any], list[dict[str, str]]]:
     """The ``fit`` of an answer (None: why is in the warnings), findings that come of it, and warnings.
 
@@ -49,7 +55,7 @@ def fitted(
     from analysis.validity import validity
 
     try:
-        fit = fit_record(record, impact, kind)
+        fit = fit_record(record, impact, kind, corrections)
     except NotFitted as e:
         return None, {}, [{"code": "not-fitted", "text": str(e)}]
     answer, cautions = to_json(fit)

@@ -12,8 +12,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from analysis.conditions import Impact
 from analysis.fit import fit_record
 from analysis.fit_intervals import parameters
+from analysis.models import on_layer
 from analysis.record import Record
-from analysis.validity import layer, peak_of
+from analysis.validity import peak_of
 from sim_device.fall import Motion
 from sim_device.sensors import signal, white
 from sim_device.settings import Dart, Hang, Rig, Sensor, Specimen
@@ -43,11 +44,14 @@ def plates() -> None:
             rig = Rig(specimen=specimen, drop=Hang(None, v0, catcher=True))
             record, top = record_of(rig, 3)
             massless = Motion(replace(rig, specimen=replace(specimen, modes=0))).contacts[0][1].F_M
-            p = parameters(fit_record(record, Impact(0.503, 6.35e-3, 4.6e-3, 0.3, "ring", 0.03, v0=v0, u_v0=0.005 * v0)))
+            p = parameters(
+                fit_record(record, Impact(0.503, 6.35e-3, 4.6e-3, 0.3, "ring", 0.03, v0=v0, u_v0=0.005 * v0))
+            )
             word = "massless" if damping is None else f"{100 * damping:g} %"
             C_i, C_d = p["C_i"], p["C_d"]
             print(
-                f"| {word} | {v0} | {100 * (top / massless - 1):+.1f} % | {100 * ((p['E'].value or 0) / 3.3e9 - 1):+.2f} % "
+                f"| {word} | {v0} | {100 * (top / massless - 1):+.1f} % "
+                f"| {100 * ((p['E'].value or 0) / 3.3e9 - 1):+.2f} % "
                 f"| {C_i.value or float('inf'):.0f} | {C_d.value or 0:.1f} | {C_d.lo or 0:.1f} to {C_d.hi or 0:.1f} |"
             )
 
@@ -62,7 +66,7 @@ def layers() -> None:
         record, top = record_of(rig, 4)
         fit = fit_record(record, Impact(0.743, 6.35e-3, thickness * 1e-3, 0.32, "rigid", None, v0=1.5, u_v0=0.0075))
         E = (parameters(fit)["E"].value or 0) * 1e-9
-        share = layer((6.35e-3 * peak_of(fit).alpha_1) ** 0.5 / (thickness * 1e-3), 0.32) - 1
+        share = on_layer((6.35e-3 * peak_of(fit).alpha_1) ** 0.5 / (thickness * 1e-3), 0.32) - 1
         print(f"| {thickness:g} | {top:.0f} | {E:.2f} | {100 * (E / 2.3 - 1):+.1f} % | {100 * share:+.1f} % |")
 
 

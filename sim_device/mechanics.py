@@ -209,7 +209,7 @@ def _equations(law: Law, failed_at: float, sense: float) -> Callable[[float, Flo
     def equations(t: float, y: Floats) -> tuple[float, ...]:
         if next(steps) > most:
             raise _NotSettled(f"it is too stiff (C_d {C_d:g} kg/s, K_d {K_d:.3g} N/m)")
-        x, v, alpha2, alpha3 = y[:4]
+        v, alpha3 = y[1], y[3]
         left = 1.0 if t < failed_at else math.exp(-(t - failed_at) / FAILURE_DECAY)
         delta = float(law.gap(y))
         alpha1 = max(delta, 0.0) if bends else law.indentation_of(delta)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -30,14 +32,18 @@ def shapes(count: int, nu: float) -> tuple[tuple[float, float], ...]:
 
     found: list[tuple[float, float]] = []
     for k in range(count):
-        root = float(brentq(edge, 1.0 + k * math.pi, 1.0 + (k + 1) * math.pi, xtol=1e-14))
+        found_at: Any = brentq(edge, 1.0 + k * math.pi, 1.0 + (k + 1) * math.pi, xtol=1e-14)
+        root = float(found_at)
         share = float(jv(0, root) / ive(0, root)) * math.exp(-root)
 
         def shape(rho: float, root: float = root, share: float = share) -> float:
             return float(jv(0, root * rho) - share * ive(0, root * rho) * math.exp(root * rho))
 
-        area = quad(lambda rho: 2 * rho * shape(rho) ** 2, 0, 1, epsabs=1e-12)[0] / shape(0) ** 2  # noqa: B023  used at once
-        found.append((root, area))
+        def weighted(rho: float, shape: Callable[[float], float] = shape) -> float:
+            return 2 * rho * shape(rho) ** 2
+
+        area: Any = quad(weighted, 0, 1, epsabs=1e-12)[0]
+        found.append((root, float(area) / shape(0) ** 2))
     return tuple(found)
 
 

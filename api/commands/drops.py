@@ -1,14 +1,17 @@
 """Commands on stored drops: import, analyze, export, verify."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from api.commands.options import Data, Json, Kind, Series, TestFileOption, checked_figure
+from api.commands.options import Correction, Data, Json, Kind, Series, TestFileOption, checked_figure
 from api.commands.show import print_answer, print_json, tell
 from daq.errors import DaqError, StoreError
-from daq.run import RunData
+
+if TYPE_CHECKING:
+    from analysis.fit_problem import Corrected
+    from daq.run import RunData
 
 
 def import_files(
@@ -59,6 +62,10 @@ def analyze(
     model: Annotated[
         Kind | None, typer.Option("--model", help="Fit this one, not that of the support; the answer is not kept.")
     ] = None,
+    correct: Annotated[
+        list[Correction] | None,
+        typer.Option("--correct", help="Correct the model for this; the answer is not kept. Give it again for more."),
+    ] = None,
     plot: Annotated[
         Path | None, typer.Option("--plot", help="FILE.png or FILE.svg of one run and its fit.", metavar="FILE")
     ] = None,
@@ -77,12 +84,18 @@ def analyze(
     store = Store(data)
     if not data.is_dir():
         raise StoreError(f"no data folder {data}")
+    how: tuple[Corrected, ...] = tuple(c.value for c in correct or ())
     failed = False
     for run in store.runs() if everything else runs or []:
         try:
-            answer = answer_of(store, run) if model is None else analysed(store.read(run), model.value)
+            kept = model is None and not how
+            answer = (
+                answer_of(store, run)
+                if kept
+                else analysed(store.read(run), None if model is None else model.value, how)
+            )
             if plot is not None:
-                _draw(store.read(run), model, plot)
+                _draw(store.read(run), model, how, plot)
         except DaqError as e:
             failed = True
             tell(f"droptower: {e}")
@@ -95,13 +108,13 @@ def analyze(
         raise typer.Exit(1)
 
 
-def _draw(run: RunData, model: Kind | None, path: Path) -> None:
+def _draw(run: "RunData", model: Kind | None, how: "tuple[Corrected, ...]", path: Path) -> None:
     from analysis.fit import NotFitted
     from api.figures import save_fit
     from api.fitting import fit_of
 
     try:
-        fit = fit_of(run, None if model is None else model.value)
+        fit = fit_of(run, None if model is None else model.value, how)
     except NotFitted as e:
         tell(f"droptower: nothing is drawn: {e}")
         return

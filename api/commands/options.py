@@ -22,6 +22,13 @@ class Kind(StrEnum):
     flexed = "flexed"
 
 
+class Correction(StrEnum):
+    """What a model can be corrected for."""
+
+    overhang = "overhang"
+    finite_thickness = "finite-thickness"
+
+
 def checked_figure(path: Path) -> None:
     """Refuse a figure file of another kind."""
     if path.suffix not in (".png", ".svg"):

@@ -99,10 +99,13 @@ def get_fit(
         Literal["conservative", "parallel", "series", "flexed"] | None,
         Query(description="another model than the support's; its answer is not kept"),
     ] = None,
+    correct: Annotated[
+        list[Literal["overhang", "finite-thickness"]] | None, Query(description="correct the model for this")
+    ] = None,
 ) -> Response:
     """The fitted model: parameters with intervals and verdicts, budget, validity; null where none can be fitted."""
     data = shared.traces.get(run).run
-    answer = answer_of(shared.store, run) if model is None else analysed(data, model)
+    answer = analysed(data, model, tuple(correct or ())) if model or correct else answer_of(shared.store, run)
     body = {"run": run, "fit": answer["fit"], "warnings": answer["warnings"], "links": links.of_run(run)}
     return JSONResponse(plain(body))
 
