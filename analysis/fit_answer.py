@@ -17,6 +17,8 @@ from analysis.record import Array
 
 _MISFIT = 0.02
 """Of F_M: what a model may leave of a record, noise taken off, before its values are doubted."""
+_PATTERN, _SMOOTH = 0.005, 3.0
+"""The same where it is no noise: where what is left goes together so much that intervals are as many times wider."""
 _UNMISTAKABLE = 10.0
 """Difference of Schwarz's criterion that settles which model it is (Kass and Raftery 1995: very strong)."""
 BESIDE: dict[Kind, Kind] = {"series": "parallel", "parallel": "series"}
@@ -113,11 +115,11 @@ def _cautions(fit: Fit, known: dict[str, Parameter]) -> list[Caution]:
     top = float(w.force.max())
     left = float(np.sqrt(np.mean(fit.left[w.kept] ** 2)))
     excess = math.sqrt(max(left**2 - w.noise**2, 0.0)) / top
-    if excess > _MISFIT:
+    if excess > (_PATTERN if fit.widened > _SMOOTH else _MISFIT):
         text = (
-            f"the {fit.problem.kind} model leaves {100 * excess:.1f} % of F_M beyond the noise (limit "
-            f"{100 * _MISFIT:g} %): its values are those of the nearest curve, not of this specimen; look at the "
-            "residuals for failure, slip or a support that is not as the test file has it"
+            f"the {fit.problem.kind} model leaves {100 * excess:.1f} % of F_M beyond the noise (limit {100 * _MISFIT:g}"
+            f" %, {100 * _PATTERN:g} % if it has a pattern): its values are those of the nearest curve, not of this "
+            "specimen; look at the residuals for failure, slip or a support that is not as the test file has it"
         )
         found.append(Caution("model-misfit", text))
     if w.left_out is not None:

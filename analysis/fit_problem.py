@@ -21,6 +21,8 @@ from analysis.record import Array
 
 LN_E, FLOW, DAMPER, V0, T0, LEVEL, MODES = range(7)
 PER_MODE = 4
+SLOWEST = 4.0
+"""Periods of a ringing in a contact, at the least: what is slower is the contact's own shape."""
 _FROM_REST = 0.2
 """Of its amplitude: what the cosine of a ringing may be; the sensor is at rest before contact."""
 Corrected = Literal["overhang", "finite-thickness"]
@@ -69,7 +71,7 @@ class Problem:
         low[FLOW] = low[DAMPER] = 0.0
         low[V0] = 0.1 * self.window.v0.value
         for k in range(MODES, n, PER_MODE):
-            low[k + 2], high[k + 2] = 1.0 / self.window.length, 0.4 / self.window.step
+            low[k + 2], high[k + 2] = SLOWEST / self.window.length, 0.4 / self.window.step
             low[k + 3], high[k + 3] = np.log(2 * self.window.step), np.log(30 * self.window.length)
         return low, high
 

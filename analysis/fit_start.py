@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from analysis.fit_problem import DAMPER, FLOW, LN_E, MODES, T0, V0, Problem
+from analysis.fit_problem import DAMPER, FLOW, LN_E, MODES, SLOWEST, T0, V0, Problem
 from analysis.models import overhang, plate_stiffness, tip_stiffness
 from analysis.record import Array
 
@@ -14,8 +14,6 @@ _LAG = 0.003
 """Of the contact's length: C_d/K_d to begin with."""
 _DECAYS = (0.03, 0.07, 0.15, 0.3, 0.7, 1.5)
 """Of the contact's length."""
-_LOWEST = 5.0
-"""Periods of a ringing in a contact, at the least: what is slower is the contact's own shape."""
 _TOP = 30e3
 """Hz."""
 _SURE = 30.0
@@ -76,7 +74,7 @@ def ringing_in(problem: Problem, left: Array, t0: float) -> tuple[float, float, 
     since = since[on]
     size = 1 << int(np.ceil(np.log2(2 * since.size)))
     frequency = np.fft.rfftfreq(size, w.step)
-    band = (frequency > _LOWEST / w.length) & (frequency < min(_TOP, 0.25 / w.step))
+    band = (frequency > SLOWEST / w.length) & (frequency < min(_TOP, 0.25 / w.step))
     if not band.any():
         return None
     best = (0.0, 0.0, 0.0, 0.0)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from analysis.forecast import SOFTEST, longest_contact
+from api.ahead import ahead
 from api.answer import analysed
 from api.join import impact_of
 from api.process import Acquisition
@@ -81,8 +82,9 @@ def start(
     ------
     SettingsError : the rig or the test file is wrong.
     """
-    first = window_of(load_rig(rig)[0], load_test(test)[0])
+    rig_file, test_file = load_rig(rig)[0], load_test(test)[0]
+    first = window_of(rig_file, test_file)
     return Acquisition(
-        "acquire", rig, data, test, series, first=first, spare=spare, again=again,
+        "acquire", rig, data, test, series, first=first, spare=spare, again=again, ahead=ahead(rig_file, test_file),
         at_window=lambda event: preliminary(event, rig, test),
     )  # fmt: skip

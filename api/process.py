@@ -24,8 +24,8 @@ class ProcessError(DaqError):
 class Acquisition:
     """A running `python -m daq`, in a session of its own: it outlives whoever started it.
 
-    `events` holds what it has said so far; iterating follows it to its end, from the first event on. `at_window` makes
-    an event of the contact window, once that has been read.
+    `events` holds what it has said so far, `ahead` before the rest; iterating follows it to its end, from the first
+    event on. `at_window` makes an event of the contact window, once that has been read.
     """
 
     def __init__(
@@ -41,6 +41,7 @@ class Acquisition:
         again: bool = False,
         at_window: Callable[[Event], Event] | None = None,
         more: list[str] | None = None,
+        ahead: list[Event] | None = None,
     ) -> None:
         command = [sys.executable, "-m", "daq", do, "--rig", str(rig)]
         command += ["--data", str(data)] if data is not None else []
@@ -52,7 +53,7 @@ class Acquisition:
         command += ["--again"] if again else []
         command += more or []
         self._at_window = at_window
-        self.events: list[Event] = []
+        self.events: list[Event] = list(ahead or [])
         self._news = threading.Condition()
         self._ended = False
         self._process = subprocess.Popen(
