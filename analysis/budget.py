@@ -44,7 +44,7 @@ def budget(fit: Fit) -> list[Row]:
     """A row an input: mass, tip mass, gain of the force, tip radius, ν, and of a plate its thickness and its ring."""
     problem, impact = fit.problem, fit.problem.impact
     w, x = problem.window, fit.best.x
-    gain_of = spread(fit) @ fit.best.J.T
+    gain_of = spread(fit) @ fit.best.J
     rows: list[Row] = []
     base = problem.residuals(x)[0]
     for name, unit in {**INPUTS, **(OF_A_PLATE if problem.kind == "flexed" else {})}.items():

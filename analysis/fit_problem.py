@@ -6,10 +6,9 @@ frequency and the log of its decay. v0 is held by what the gate says, b by the s
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,12 +35,15 @@ FREE: dict[Kind, tuple[int, ...]] = {
 }
 
 
-@cache
-def compiled() -> Callable[[Array, Array, Array, Array], float]:
-    """The kernel; the first call loads it (a second from its cache, ten without)."""
-    from analysis.kernel import contact
+_NONE = np.empty((0, 0))
 
-    return contact
+
+@cache
+def kernel() -> Any:
+    """The compiled functions; the first call loads them (a second from their cache, ten without)."""
+    import analysis.kernel
+
+    return analysis.kernel
 
 
 @dataclass(frozen=True)
@@ -98,67 +100,44 @@ class Problem:
             base = tuple(k * by**n for n, k in enumerate(layer(nu), 1))
         return np.array([i.mass, i.g, i.friction / i.mass, K, x[FLOW], q, lag, beside, x[V0], share, *base])
 
-    def contact(self, x: Array, t: Array, slopes: Array | None = None) -> Array:
-        """Contact force in N at ``t`` (n,), s on the record's axis; its derivatives into ``slopes`` (n, 5)."""
+    def contact(self, x: Array, t: Array) -> Array:
+        """Contact force in N at ``t`` (n,), s on the record's axis."""
         force = np.empty(t.size)
-        compiled()(self.constants(x), t - x[T0], force, np.empty((0, 5)) if slopes is None else slopes)
+        kernel().contact(self.constants(x), t - x[T0], force, _NONE)
         return force
 
     def ringing(self, x: Array, t: Array) -> Array:
-        """Force of the ringing in N at ``t`` (n,)."""
-        total = np.zeros(t.size)
+        """Force of the ringing in N at ``t`` (n,), evenly spaced."""
+        total, step = np.zeros(t.size), float(t[1] - t[0])
         for k in range(MODES, x.size, PER_MODE):
-            total += self._mode(x, k, t)[0]
+            unused = np.empty((5, t.size))
+            kernel().ringing(t, step, *_wave(x, k), total, unused[:4], unused[4])
         return total
 
-    @staticmethod
-    def _mode(x: Array, k: int, t: Array) -> tuple[Array, Array, Array, Array, Array]:
-        """Of one mode: its wave, the sine, the cosine, how the wave changes with the phase ωs, and the time s.
-
-        The sensor is at rest when contact begins: the cosine comes in over a radian, so that no sample jumps with t0.
-        """
-        since = np.maximum(t - x[T0], 0.0)
-        omega = 2 * np.pi * x[k + 2]
-        wave: NDArray[np.complex128] = np.exp((-np.exp(-x[k + 3]) + 1j * omega) * since)
-        fading = np.exp(-omega * since)
-        on = t > x[T0]
-        sine, cosine = wave.imag, wave.real * (1 - fading)
-        turned = x[k + 1] * wave.real + x[k] * (wave.real * fading - wave.imag * (1 - fading))
-        return x[k] * cosine + x[k + 1] * sine, sine, cosine, np.where(on, turned, 0.0), since
-
     def residuals(self, x: Array) -> tuple[Array, Array]:
-        """(n + r,) weighted residuals and their (n + r, p) derivatives.
+        """(n + r,) weighted residuals and their (p, n + r) derivatives.
 
         The last r are those of v0, of the zero level, and of each mode's cosine, which rest before contact forbids.
         """
-        w = self.window
-        slopes = np.empty((w.t.size, 5))
-        model = self.contact(x, w.t, slopes)
-        n = w.t.size
-        J = np.zeros((n + 2 + len(self.modes), x.size))
-        part = J[:n]
-        part[:, LN_E], part[:, FLOW], part[:, DAMPER], part[:, V0] = slopes[:, :4].T
-        part[:, T0] = -slopes[:, 4]
-        part[:, LEVEL] = 1.0
+        w, n = self.window, self.window.t.size
+        r, J = np.zeros(n + 2 + len(self.modes)), np.zeros((x.size, n + 2 + len(self.modes)))
+        part, model = J[:, :n], r[:n]
+        kernel().contact(self.constants(x), w.t - x[T0], model, part[:LEVEL])
+        part[T0] *= -1
+        part[LEVEL] = 1.0
         model += x[LEVEL]
         for k in range(MODES, x.size, PER_MODE):
-            wave, sine, cosine, turned, since = self._mode(x, k, w.t)
-            model += wave
-            decay, omega = np.exp(x[k + 3]), 2 * np.pi * x[k + 2]
-            part[:, k], part[:, k + 1] = cosine, sine
-            part[:, k + 2] = 2 * np.pi * since * turned
-            part[:, k + 3] = wave * since / decay
-            part[:, T0] += wave / decay - omega * turned
-        weight = w.kept / self.noise
-        r = np.zeros(len(J))
-        r[:n] = (model - w.force) * weight
-        part *= weight[:, None]
+            kernel().ringing(w.t, w.step, *_wave(x, k), model, part[k : k + 4], part[T0])
+        model -= w.force
+        weight = w.kept / self.noise if w.left_out is not None else 1 / self.noise
+        model *= weight
+        part *= weight
         if w.v0.u > 0:
-            r[n], J[n, V0] = (x[V0] - w.v0.value) / w.v0.u, 1 / w.v0.u
-        r[n + 1], J[n + 1, LEVEL] = x[LEVEL] / w.u_level, 1 / w.u_level
+            r[n], J[V0, n] = (x[V0] - w.v0.value) / w.v0.u, 1 / w.v0.u
+        r[n + 1], J[LEVEL, n + 1] = x[LEVEL] / w.u_level, 1 / w.u_level
         for j, amplitude in enumerate(self.modes):
             k = MODES + PER_MODE * j
-            r[n + 2 + j], J[n + 2 + j, k] = x[k] / (_FROM_REST * amplitude), 1 / (_FROM_REST * amplitude)
+            r[n + 2 + j], J[k, n + 2 + j] = x[k] / (_FROM_REST * amplitude), 1 / (_FROM_REST * amplitude)
         return r, J
 
     def with_mode(self, x: Array, frequency: float, decay: float, amplitude: float) -> tuple[Problem, Array]:
@@ -166,10 +145,17 @@ class Problem:
         return replace(self, modes=(*self.modes, amplitude)), np.concatenate((x, [0.0, 0.0, frequency, np.log(decay)]))
 
 
+def _wave(x: Array, k: int) -> tuple[float, ...]:
+    """t0, cosine, sine, frequency and decay of the mode that begins at ``k``."""
+    return (*(float(v) for v in x[[T0, k, k + 1, k + 2]]), float(np.exp(x[k + 3])))
+
+
 if __name__ == "__main__":  # at set-up: compiled once, read from its cache ever after
-    compiled()(
-        np.array([1.0, 9.8, 0.0, 1e8, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0]),
-        np.zeros(1),
-        np.zeros(1),
-        np.zeros((1, 5)),
-    )
+    some = np.zeros(2)
+    ball = np.array([1.0, 9.8, 0.0, 1e8, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+    for slopes in (_NONE, np.zeros((8, 3))[:5, :2]):  # its two layouts in memory
+        kernel().contact(ball, some, np.zeros(2), slopes)
+        kernel().contact(ball, some, np.zeros(3)[:2], slopes)
+    for rows in (np.zeros((5, 2)), np.zeros((5, 3))[:, :2]):
+        kernel().ringing(some, 1e-6, 0.0, 1.0, 1.0, 1e4, 1e-3, np.zeros(2), rows[:4], rows[4])
+    kernel().path(np.arange(2.0), some, 1.0, 1.0, 9.8, *np.zeros((4, 2)))

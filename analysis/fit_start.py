@@ -10,6 +10,8 @@ from analysis.record import Array
 
 _SHARE = 0.1
 """Of F_M: the regression looks at what is above."""
+_ENOUGH = 300
+"""Points."""
 _LAG = 0.003
 """Of the contact's length: C_d/K_d to begin with."""
 _DECAYS = (0.03, 0.07, 0.15, 0.3, 0.7, 1.5)
@@ -31,7 +33,8 @@ def start_of(problem: Problem) -> Array:
     impulse = np.cumsum(pushed) * w.step
     speed = w.v0.value + i.g * since - impulse / i.mass
     depth = np.cumsum(speed) * w.step
-    on = w.kept[inside] & (pushed > _SHARE * pushed.max()) & (depth > 0)
+    on = np.flatnonzero(w.kept[inside] & (pushed > _SHARE * pushed.max()) & (depth > 0))
+    on = on[:: max(1, on.size // _ENOUGH)]
     F, J, v, alpha = pushed[on], impulse[on], speed[on], depth[on]
     assert i.nu is not None, "the caller has seen to it"
     x = np.zeros(MODES)
@@ -43,10 +46,11 @@ def start_of(problem: Problem) -> Array:
         return x
     flows = problem.kind != "conservative"
     bends = problem.kind == "flexed"
+    pressing = F ** (2 / 3)
     for _ in range(20):
         E = float(np.exp(x[LN_E]))
         stiffness, share = tip_stiffness(i.tip_radius, E, i.nu, i.tip_E, i.tip_nu)
-        pressed, bent = (F / stiffness) ** (2 / 3), np.zeros(F.size)
+        pressed, bent = pressing * stiffness ** (-2 / 3), np.zeros(F.size)
         if bends:
             assert i.thickness is not None
             assert i.support_radius is not None
@@ -56,7 +60,7 @@ def start_of(problem: Problem) -> Array:
                 K_d *= overhang(i.diameter / 2, i.support_radius, i.nu)
             bent, x[DAMPER] = F / K_d, _LAG * w.length * K_d
         columns = np.column_stack((-2 / 3 * share * pressed - bent, J))[:, : 1 + flows]
-        step = np.linalg.lstsq(columns, alpha - pressed - bent - x[FLOW] * J, rcond=None)[0]
+        step = np.linalg.solve(columns.T @ columns, columns.T @ (alpha - pressed - bent - x[FLOW] * J))
         x[LN_E] += np.clip(step[0], -1, 1)
         x[FLOW] += step[1] if flows else 0.0
         if abs(step[0]) < 1e-4:

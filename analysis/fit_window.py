@@ -11,7 +11,8 @@ from analysis.events import Events
 from analysis.record import Array, Record
 from analysis.speed import Speed
 
-_CONTACT_POINTS = 1000
+POINTS = 1000
+"""Of a contact, at the least, where it has as many samples."""
 _BEFORE, _AFTER = 0.03, 0.5
 """Of the contact's length; what lies further before has said its word as the zero level."""
 _RINGS_FOR = 1e-3
@@ -55,7 +56,7 @@ def window_of(record: Record, events: Events, v0: Speed) -> Window:
     if events.second is not None:
         last = min(last, events.second.t - 5 * dt)
     first, stop = np.searchsorted(t, [start - _BEFORE * length, last])
-    block = max(1, int(length / dt) // _CONTACT_POINTS)
+    block = max(1, int(length / dt) // POINTS)
     n = (stop - first) // block
     part = slice(first, first + n * block)
     railed: NDArray[np.bool_] = np.any(_railed(record, events)[part].reshape(n, block), axis=1)

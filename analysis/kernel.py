@@ -1,4 +1,6 @@
-"""The lumped models as one compiled function: contact force at many times, and how it changes with each parameter.
+"""What is worth compiling: the lumped models with their sensitivities, ringing, and the integrals of a record.
+
+`contact` is every lumped model: contact force at many times, and how it changes with each parameter.
 
 With c = 1/C_i, q = 1/K_d and θ = C_d·q, any of which may be 0, δ = α₁ + α₃ and G = K_i·max(α₁, 0)^(3/2):
 
@@ -33,6 +35,7 @@ _A = np.array(
 _W = np.linalg.inv(_A)
 _A2 = _A @ _A
 _AC = _A @ _C
+_SUM = _W.sum(axis=1)
 _INTERPOLATE = np.linalg.inv(np.vander(np.concatenate((np.zeros(1), _C)), 4, increasing=True))
 """Values at 0 and the three nodes → coefficients of the cubic through them."""
 
@@ -139,49 +142,62 @@ def _stages(h, v, delta, alpha, m, g, K, base, theta, B, P, A, G, G1, R, M, lag,
 
 
 @njit(cache=True)
-def _sensitivities(h, m, c, q, theta, C, share, alpha, A, G, G1, V, F, B, P, inverse, S, SA, SV, w):
-    """One step of the sensitivities S (4, 3) of v, δ, α₁; their stages into SA, SV (4, 3)."""
+def _sensitivities(h, m, c, q, theta, share, alpha, A, G, G1, V, B, inverse, S, SA, SV, w):
+    """One step of the sensitivities S (4, 3) of v, δ, α₁ without C; their stages into SA, SV (4, 3)."""
     for p in range(4):
-        theta_p = -theta if p == LN_E else (q if p == DAMPER and C == 0 else 0.0)
-        q_p = -q if p == LN_E else 0.0
+        v, delta, lag = S[p, 0], S[p, 1], theta / h * S[p, 2]
+        theta_p = -theta if p == LN_E else (q if p == DAMPER else 0.0)
+        gained = share if p == LN_E else 0.0  # of G at fixed α₁
         for i in range(3):
-            w[0, i] = share * G[i] if p == LN_E else 0.0  # what G gains at fixed α₁
-            w[1, i] = V[i] if p == DAMPER and C > 0 else 0.0  # and F beside it, at fixed v
-        for i in range(3):
-            s = S[p, 1] + theta * S[p, 0] - q_p * F[i]
+            s = (
+                delta
+                + (theta + h * _C[i]) * v
+                + lag * _SUM[i]
+                - gained * (B[i, 0] * G[0] + B[i, 1] * G[1] + B[i, 2] * G[2])
+            )
             if theta_p != 0.0:
-                s += theta_p * (V[i] - c * F[i])
-            if p == FLOW:
-                s -= theta * F[i]
-            for j in range(3):
-                if theta != 0.0 or theta_p != 0.0:
-                    s += theta / h * _W[i, j] * S[p, 2] - theta_p / h * _W[i, j] * (A[j] - alpha)
-                if p == FLOW:
-                    s -= h * _A[i, j] * F[j]
-                s -= B[i, j] * w[0, j]
-                for k in range(3):
-                    pushed = 0.0
-                    if p == DAMPER and C > 0:
-                        pushed = h / m * (_A[k, 0] * w[1, 0] + _A[k, 1] * w[1, 1] + _A[k, 2] * w[1, 2])
-                    s += h * _A[i, j] * P[j, k] * (S[p, 0] - pushed)
-            w[2, i] = s
+                behind = _W[i, 0] * (A[0] - alpha) + _W[i, 1] * (A[1] - alpha) + _W[i, 2] * (A[2] - alpha)
+                s += theta_p * (V[i] - c * G[i] - behind / h)
+            if p == LN_E:
+                s += q * G[i]
+            elif p == FLOW:
+                s -= theta * G[i] + h * (_A[i, 0] * G[0] + _A[i, 1] * G[1] + _A[i, 2] * G[2])
+            w[i] = s
         for i in range(3):
-            SA[p, i] = inverse[i, 0] * w[2, 0] + inverse[i, 1] * w[2, 1] + inverse[i, 2] * w[2, 2]
+            SA[p, i] = inverse[i, 0] * w[0] + inverse[i, 1] * w[1] + inverse[i, 2] * w[2]
         for i in range(3):
-            w[0, i] += G1[i] * SA[p, i]
+            w[i] = G1[i] * SA[p, i] + gained * G[i]
+        total = 0.0
         for i in range(3):
-            s = 0.0
-            for j in range(3):
-                taken = 0.0
-                for k in range(3):
-                    taken += _A[j, k] * (w[0, k] + w[1, k])
-                s += P[i, j] * (S[p, 0] - h / m * taken)
-            SV[p, i] = s
-        gained = 0.0
-        for j in range(3):
-            SF = w[0, j] + w[1, j] + C * SV[p, j]
-            gained += _A[2, j] * (SV[p, j] - c * SF - (F[j] if p == FLOW else 0.0))
-        S[p, 0], S[p, 1], S[p, 2] = SV[p, 2], S[p, 1] + h * gained, SA[p, 2]
+            SV[p, i] = v - h / m * (_A[i, 0] * w[0] + _A[i, 1] * w[1] + _A[i, 2] * w[2])
+            total += _A[2, i] * (SV[p, i] - c * w[i] - (G[i] if p == FLOW else 0.0))
+        S[p, 0], S[p, 1], S[p, 2] = SV[p, 2], delta + h * total, SA[p, 2]
+
+
+@njit(cache=True)
+def _sensitivities_beside(h, m, C, share, A, G, G1, V, P, inverse, S, SA, SV, w, x):
+    """The same with the parallel dashpot, where c = q = θ = 0: F = G + C·v."""
+    for p in range(4):
+        v, delta = S[p, 0], S[p, 1]
+        for i in range(3):
+            w[i] = (share * G[i] if p == LN_E else 0.0) + (V[i] if p == DAMPER else 0.0)  # what F gains at fixed α₁, v
+        for i in range(3):
+            x[i] = v - h / m * (_A[i, 0] * w[0] + _A[i, 1] * w[1] + _A[i, 2] * w[2])
+        for i in range(3):
+            SV[p, i] = P[i, 0] * x[0] + P[i, 1] * x[1] + P[i, 2] * x[2]  # without what α₁ gains
+        for i in range(3):
+            x[i] = delta + h * (_A[i, 0] * SV[p, 0] + _A[i, 1] * SV[p, 1] + _A[i, 2] * SV[p, 2])
+        for i in range(3):
+            SA[p, i] = inverse[i, 0] * x[0] + inverse[i, 1] * x[1] + inverse[i, 2] * x[2]
+        for i in range(3):
+            w[i] += G1[i] * SA[p, i]
+        for i in range(3):
+            x[i] = v - h / m * (_A[i, 0] * w[0] + _A[i, 1] * w[1] + _A[i, 2] * w[2])
+        total = 0.0
+        for i in range(3):
+            SV[p, i] = P[i, 0] * x[0] + P[i, 1] * x[1] + P[i, 2] * x[2]
+            total += _A[2, i] * SV[p, i]
+        S[p, 0], S[p, 1], S[p, 2] = SV[p, 2], delta + h * total, SA[p, 2]
 
 
 @njit(cache=True)
@@ -198,8 +214,8 @@ def contact(constants, times, force, slopes):
 
     constants : (14,) m kg, g m/s², drag m/s² (friction over mass), K_i N/m^1.5, c s/kg, q m/N, θ s, C kg/s, v0 m/s, the
     share of ln E in ln K_i (1 on a rigid tip), and what the base under a layer adds, of √α₁ to its fourth power (0 on a
-    half-space). slopes : (n, 5) takes the sensitivities in the order of `LN_E` …
-    `TIME`; (0, 5): none are wanted. Returns the end of contact in s; inf where the dart stays, nan where the constants
+    half-space). slopes : (5, n) takes the sensitivities in the order of `LN_E` …
+    `TIME`; (0, n): none are wanted. Returns the end of contact in s; inf where the dart stays, nan where the constants
     make a contact that cannot be integrated.
     """
     m, gravity, drag, K, c, q, theta, C, v0, share = constants[:10]
@@ -209,7 +225,7 @@ def contact(constants, times, force, slopes):
     slopes[:] = 0.0
     B, P, X, M, lag, inverse = np.empty((6, 3, 3))
     A, G, G1, R, V, F, over = np.empty((7, 3))
-    S, SA, SV, w = np.zeros((4, 3)), np.empty((4, 3)), np.empty((4, 3)), np.empty((3, 3))
+    S, SA, SV, w = np.zeros((4, 3)), np.empty((4, 3)), np.empty((4, 3)), np.empty(3)
     S[SPEED, 0] = 1.0
     cubic, speed, by, by_v = np.empty(4), np.empty(4), np.empty((4, 4)), np.empty((4, 4))
     before = np.zeros((4, 3))
@@ -260,7 +276,10 @@ def contact(constants, times, force, slopes):
             _cubic(v, V, speed)
         if wanted:
             before[:] = S
-            _sensitivities(h, m, c, q, theta, C, share, alpha, A, G, G1, V, F, B, P, inverse, S, SA, SV, w)
+            if C > 0:
+                _sensitivities_beside(h, m, C, share, A, G, G1, V, P, inverse, S, SA, SV, w, over)
+            else:
+                _sensitivities(h, m, c, q, theta, share, alpha, A, G, G1, V, B, inverse, S, SA, SV, w)
             for p in range(4):
                 _cubic(before[p, 2], SA[p], by[p])
                 if C > 0:
@@ -280,15 +299,15 @@ def contact(constants, times, force, slopes):
                 if wanted:
                     for p in range(4):
                         s = by[p]
-                        slopes[at, p] = F1 * (s[0] + x * (s[1] + x * (s[2] + x * s[3])))
+                        slopes[p, at] = F1 * (s[0] + x * (s[1] + x * (s[2] + x * s[3])))
                         if C > 0:
                             s = by_v[p]
-                            slopes[at, p] += C * (s[0] + x * (s[1] + x * (s[2] + x * s[3])))
-                    slopes[at, LN_E] += share * spring
-                    slopes[at, TIME] = F1 * (cubic[1] + x * (2 * cubic[2] + x * 3 * cubic[3])) / h
+                            slopes[p, at] += C * (s[0] + x * (s[1] + x * (s[2] + x * s[3])))
+                    slopes[LN_E, at] += share * spring
+                    slopes[TIME, at] = F1 * (cubic[1] + x * (2 * cubic[2] + x * 3 * cubic[3])) / h
                     if C > 0:
-                        slopes[at, DAMPER] += speed[0] + x * (speed[1] + x * (speed[2] + x * speed[3]))
-                        slopes[at, TIME] += C * (speed[1] + x * (2 * speed[2] + x * 3 * speed[3])) / h
+                        slopes[DAMPER, at] += speed[0] + x * (speed[1] + x * (speed[2] + x * speed[3]))
+                        slopes[TIME, at] += C * (speed[1] + x * (2 * speed[2] + x * 3 * speed[3])) / h
             at += 1
         pulled = 0.0
         for j in range(3):
@@ -299,3 +318,54 @@ def contact(constants, times, force, slopes):
         if parted:
             return t
     return math.inf
+
+
+@njit(cache=True)
+def ringing(times, step, t0, cosine, sine, frequency, decay, force, rows, by_t0):
+    """Add a decaying mode that begins at rest at ``t0`` to ``force`` (n,), at ``times`` (n,) s, ``step`` s apart.
+
+    w(s) = e^{−s/d}·[c·cos ωs·(1 − e^{−ωs}) + p·sin ωs]. rows : (4, n) takes the derivatives by c, p, the frequency (Hz)
+    and ln d; by_t0 : (n,) is added that by t0. By recursion from the first point after t0, exact but for rounding.
+    """
+    omega = 2 * math.pi * frequency
+    rows[:] = 0.0
+    first = 0
+    while first < times.shape[0] and times[first] <= t0:
+        first += 1
+    if first == times.shape[0]:
+        return
+    s = times[first] - t0
+    envelope, shrink = math.exp(-s / decay), math.exp(-step / decay)
+    fading, fade = math.exp(-omega * s), math.exp(-omega * step)
+    co, si, turn_c, turn_s = math.cos(omega * s), math.sin(omega * s), math.cos(omega * step), math.sin(omega * step)
+    for i in range(first, times.shape[0]):
+        in_c, in_s = envelope * co * (1 - fading), envelope * si
+        wave = cosine * in_c + sine * in_s
+        turned = sine * envelope * co + cosine * envelope * (co * fading - si * (1 - fading))
+        force[i] += wave
+        rows[0, i], rows[1, i] = in_c, in_s
+        rows[2, i] = 2 * math.pi * s * turned
+        rows[3, i] = wave * s / decay
+        by_t0[i] += wave / decay - omega * turned
+        co, si = co * turn_c - si * turn_s, si * turn_c + co * turn_s
+        envelope, fading, s = envelope * shrink, fading * fade, s + step
+
+
+@njit(cache=True)
+def path(t, force, mass, v0, g, J, v, alpha, energy):
+    """∫F dt, v, α and ∫F·v dt by the trapezoid rule into four arrays (n,), from those at t[0]: 0, v0, 0, 0.
+
+    v = v0 + g·(t − t[0]) − J/m; t s, rising, and force N (n,).
+    """
+    j, a, e, before, v_before = 0.0, 0.0, 0.0, force[0], v0
+    J[0], v[0], alpha[0], energy[0] = 0.0, v0, 0.0, 0.0
+    over = 1.0 / mass
+    for i in range(1, t.shape[0]):
+        half = 0.5 * (t[i] - t[i - 1])
+        now = force[i]
+        j += half * (before + now)
+        v_now = v0 + g * (t[i] - t[0]) - over * j
+        a += half * (v_before + v_now)
+        e += half * (before * v_before + now * v_now)
+        J[i], v[i], alpha[i], energy[i] = j, v_now, a, e
+        before, v_before = now, v_now

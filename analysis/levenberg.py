@@ -19,7 +19,7 @@ _DONE = 1e-7
 @dataclass(frozen=True)
 class Optimum:
     """x : (p,) the best point; chi2 : sum of squares there; N : (p, p) JᵀJ; at_bound : (p,) bool
-    residuals : (n,); J : (n, p); solves : of the model; converged : bool
+    residuals : (n,); J : (p, n); solves : of the model; converged : bool
     """
 
     x: Array
@@ -38,7 +38,7 @@ def minimise(residuals: Residuals, x: Array, free: NDArray[np.bool_], low: Array
     here, damping, solves, converged = residuals(x), 1e-4, 1, False
     chi2 = float(here[0] @ here[0])
     while solves < _MOST and not converged:
-        normal, gradient = here[1].T @ here[1], here[1].T @ here[0]
+        normal, gradient = here[1] @ here[1].T, here[1] @ here[0]
         held = ((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0))
         better = None
         while better is None and solves < _MOST and damping < 1e10:
@@ -58,7 +58,7 @@ def minimise(residuals: Residuals, x: Array, free: NDArray[np.bool_], low: Array
         if better is None:
             break
         x, here, chi2 = better
-    normal, gradient = here[1].T @ here[1], here[1].T @ here[0]
+    normal, gradient = here[1] @ here[1].T, here[1] @ here[0]
     at_bound = free & (((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0)))
     return Optimum(x, chi2, normal, at_bound, here[0], here[1], solves, converged)
 
@@ -70,7 +70,7 @@ def _step(normal: Array, gradient: Array, on: NDArray[np.bool_], damping: float)
         part = normal[np.ix_(at, at)]
         scale = np.sqrt(np.maximum(np.diag(part), 1e-300))
         scaled = part / np.outer(scale, scale) + damping * np.eye(at.size)
-        step[at] = -np.linalg.lstsq(scaled, gradient[at] / scale, rcond=1e-14)[0] / scale
+        step[at] = -np.linalg.solve(scaled, gradient[at] / scale) / scale
     return step
 
 

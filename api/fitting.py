@@ -19,9 +19,9 @@ def warm() -> None:
     """Load what a fit needs, in the background: the operator does not wait for it at the first drop."""
 
     def load() -> None:
-        from analysis.fit_problem import compiled
+        from analysis.fit_problem import kernel
 
-        compiled()
+        kernel()
 
     threading.Thread(target=load, name="kernel", daemon=True).start()
 
