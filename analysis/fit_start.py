@@ -10,6 +10,8 @@ from analysis.record import Array
 
 _SHARE = 0.1
 """Of F_M: the regression looks at what is above."""
+_NEAR = 1e-3
+"""Of E: the regression's own error is ten times as large."""
 _ENOUGH = 300
 """Points."""
 _LAG = 0.003
@@ -59,11 +61,16 @@ def start_of(problem: Problem) -> Array:
                 assert i.diameter is not None
                 K_d *= overhang(i.diameter / 2, i.support_radius, i.nu)
             bent, x[DAMPER] = F / K_d, _LAG * w.length * K_d
-        columns = np.column_stack((-2 / 3 * share * pressed - bent, J))[:, : 1 + flows]
-        step = np.linalg.solve(columns.T @ columns, columns.T @ (alpha - pressed - bent - x[FLOW] * J))
-        x[LN_E] += np.clip(step[0], -1, 1)
-        x[FLOW] += step[1] if flows else 0.0
-        if abs(step[0]) < 1e-4:
+        by_E, missing = -2 / 3 * share * pressed - bent, alpha - pressed - bent - x[FLOW] * J
+        EE, EJ, JJ = by_E @ by_E, by_E @ J, J @ J
+        determinant = EE * JJ - EJ * EJ if flows else 1.0
+        step = (
+            ((by_E @ missing) * JJ - (J @ missing) * EJ) / determinant if flows else (by_E @ missing) / EE,
+            ((J @ missing) * EE - (by_E @ missing) * EJ) / determinant if flows else 0.0,
+        )
+        x[LN_E] += min(max(step[0], -1.0), 1.0)
+        x[FLOW] += step[1]
+        if abs(step[0]) < _NEAR:
             break
     x[FLOW] = max(x[FLOW], 0.0)
     return x

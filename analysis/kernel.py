@@ -47,7 +47,7 @@ LN_E, FLOW, DAMPER, SPEED, TIME = 0, 1, 2, 3, 4
 """Columns of the sensitivities: by ln E, by c = 1/C_i, by C_d (or C), by v0, by time."""
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _inverse(M, out):
     """Inverse of a 3×3 matrix."""
     c0 = M[1, 1] * M[2, 2] - M[1, 2] * M[2, 1]
@@ -63,7 +63,7 @@ def _inverse(M, out):
     out[2, 2] = (M[0, 0] * M[1, 1] - M[0, 1] * M[1, 0]) * d
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _spring(alpha, K, base):
     """G and dG/dα₁: K·α^1.5, times 1 + Σ base_n·α^(n/2) over a layer."""
     if alpha <= 0:
@@ -77,7 +77,7 @@ def _spring(alpha, K, base):
     return K * u * u * u * more, K * u * (1.5 * more + 0.5 * u * by_u)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _matrices(h, m, c, q, theta, C, B, P, X):
     """B: what the stages of G weigh in the equations of α₁; P: V = P·(v + h·g·c_i − h/m·A·G)."""
     for i in range(3):
@@ -102,14 +102,15 @@ def _matrices(h, m, c, q, theta, C, B, P, X):
         B[i, i] += q + theta * c
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _stages(h, v, delta, alpha, m, g, K, base, theta, B, P, A, G, G1, R, M, lag, over, inverse):
     """Newton over the stages A (3,) of α₁, from what is in A; leaves G, dG/dα, the inverse Jacobian. True if done."""
+    for j in range(3):
+        over[j] = v + h * g * _C[j]
     for i in range(3):
-        known = delta + theta * (v + h * g * _C[i])
+        known = delta + theta * over[i]
         for j in range(3):
-            for k in range(3):
-                known += h * _A[i, j] * P[j, k] * (v + h * g * _C[k])
+            known += h * _A[i, j] * (P[j, 0] * over[0] + P[j, 1] * over[1] + P[j, 2] * over[2])
             M[i, j] = theta / h * _W[i, j]
             known += M[i, j] * alpha
         R[i] = known
@@ -134,14 +135,14 @@ def _stages(h, v, delta, alpha, m, g, K, base, theta, B, P, A, G, G1, R, M, lag,
             change, scale = max(change, abs(s)), max(scale, abs(A[i]))
         if not change < 1e300:
             return False
-        if change <= 1e-9 * scale + 1e-18:
+        if change <= 1e-6 * scale + 1e-18:
             for i in range(3):
                 G[i], G1[i] = _spring(A[i], K, base)
             return True
     return False
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _sensitivities(h, m, c, q, theta, share, alpha, A, G, G1, V, B, inverse, S, SA, SV, w):
     """One step of the sensitivities S (4, 3) of v, δ, α₁ without C; their stages into SA, SV (4, 3)."""
     for p in range(4):
@@ -174,7 +175,7 @@ def _sensitivities(h, m, c, q, theta, share, alpha, A, G, G1, V, B, inverse, S, 
         S[p, 0], S[p, 1], S[p, 2] = SV[p, 2], delta + h * total, SA[p, 2]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _sensitivities_beside(h, m, C, share, A, G, G1, V, P, inverse, S, SA, SV, w, x):
     """The same with the parallel dashpot, where c = q = θ = 0: F = G + C·v."""
     for p in range(4):
@@ -200,7 +201,7 @@ def _sensitivities_beside(h, m, C, share, A, G, G1, V, P, inverse, S, SA, SV, w,
         S[p, 0], S[p, 1], S[p, 2] = SV[p, 2], delta + h * total, SA[p, 2]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _cubic(at_0, stages, out):
     for k in range(4):
         out[k] = _INTERPOLATE[k, 0] * at_0
@@ -208,7 +209,7 @@ def _cubic(at_0, stages, out):
             out[k] += _INTERPOLATE[k, j + 1] * stages[j]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def contact(constants, times, force, slopes):
     """Contact force at ``times`` (n,), s from touch, rising, into ``force`` (n,), 0 outside the contact.
 
@@ -251,13 +252,11 @@ def contact(constants, times, force, slopes):
             _matrices(h, m, c, q, theta, C, B, P, X)
             if not _stages(h, v, delta, alpha, m, g, K, base, theta, B, P, A, G, G1, R, M, lag, over, inverse):
                 return math.nan
+            for j in range(3):
+                over[j] = v + h * g * _C[j] - h / m * (_A[j, 0] * G[0] + _A[j, 1] * G[1] + _A[j, 2] * G[2])
             for i in range(3):
-                s = 0.0
-                for j in range(3):
-                    taken = _A[j, 0] * G[0] + _A[j, 1] * G[1] + _A[j, 2] * G[2]
-                    s += P[i, j] * (v + h * g * _C[j] - h / m * taken)
-                V[i] = s
-                F[i] = G[i] + C * s
+                V[i] = P[i, 0] * over[0] + P[i, 1] * over[1] + P[i, 2] * over[2] if C > 0 else over[i]
+                F[i] = G[i] + C * V[i]
             gauge = F[2] if C > 0 else A[2]
             if attempt == 0:
                 if gauge > 0:
@@ -320,7 +319,7 @@ def contact(constants, times, force, slopes):
     return math.inf
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def ringing(times, step, t0, cosine, sine, frequency, decay, force, rows, by_t0):
     """Add a decaying mode that begins at rest at ``t0`` to ``force`` (n,), at ``times`` (n,) s, ``step`` s apart.
 
@@ -351,7 +350,7 @@ def ringing(times, step, t0, cosine, sine, frequency, decay, force, rows, by_t0)
         envelope, fading, s = envelope * shrink, fading * fade, s + step
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def path(t, force, mass, v0, g, J, v, alpha, energy):
     """∫F dt, v, α and ∫F·v dt by the trapezoid rule into four arrays (n,), from those at t[0]: 0, v0, 0, 0.
 

@@ -67,10 +67,11 @@ def _step(normal: Array, gradient: Array, on: NDArray[np.bool_], damping: float)
     step = np.zeros(gradient.size)
     at = np.flatnonzero(on)
     if at.size:
-        part = normal[np.ix_(at, at)]
-        scale = np.sqrt(np.maximum(np.diag(part), 1e-300))
-        scaled = part / np.outer(scale, scale) + damping * np.eye(at.size)
-        step[at] = -np.linalg.solve(scaled, gradient[at] / scale) / scale
+        part = normal[at[:, None], at]
+        scale = 1 / np.sqrt(np.maximum(part.diagonal(), 1e-300))
+        scaled = part * scale * scale[:, None]
+        scaled.flat[:: at.size + 1] += damping
+        step[at] = -np.linalg.solve(scaled, gradient[at] * scale) * scale
     return step
 
 

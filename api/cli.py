@@ -4,7 +4,7 @@ import sys
 
 import typer
 
-from api.commands import drops, live, model, service
+from api.commands import drops, live, model, series, service
 from daq.errors import DaqError
 
 app = typer.Typer(
@@ -21,6 +21,7 @@ app.command("check")(live.check)
 app.command("import")(drops.import_files)
 app.command("analyze")(drops.analyze)
 app.command("model")(model.model)
+app.command("series")(series.series)
 app.command("export")(drops.export)
 app.command("verify")(drops.verify)
 app.command("serve")(service.serve)

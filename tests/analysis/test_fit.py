@@ -12,11 +12,12 @@ import pytest
 
 from analysis.budget import budget
 from analysis.conditions import Impact
-from analysis.fit import NotFitted, fit_record
+from analysis.fit import Fit, NotFitted, fit_record
 from analysis.fit_answer import to_json
 from analysis.fit_intervals import DETERMINED, LOWER, UPPER, parameters, profile_end, spread
 from analysis.fit_problem import DAMPER, FLOW, T0
 from analysis.fit_profile import elements_of, profile
+from analysis.joint import fit_jointly
 from analysis.record import Record
 from analysis.validity import validity
 
@@ -223,3 +224,46 @@ def test_an_impact_without_uncertainty_of_v0_takes_it_as_exact():
     assert parameters(fit)["v0"].u == 0
     assert parameters(fit)["E"].value == pytest.approx(d.truth["E"], rel=0.02)
     assert isinstance(fit.problem.impact, Impact)
+
+
+def _joint_drops(n: float, count: int = 6) -> list[Fit]:
+    """Indentations of one material, E = 2.3 GPa·(v0/2)^n."""
+    fits: list[Fit] = []
+    for k in range(count):
+        v0 = 1.2 + 0.4 * k
+        d = drop(REST, 40 + k, E_GPa=2.3 * (v0 / 2) ** n, C=8000.0, v0=v0)
+        fits.append(fit_record(d.record, d.impact))
+    return fits
+
+
+def test_drops_together_tell_more_than_each():
+    fits = _joint_drops(0.0)
+    joint = fit_jointly(fits, law=False)
+    E, single = joint.parameters["E"], parameters(fits[0])["E"]
+    assert joint.agree
+    assert abs((E.value or 0) - 2.3e9) < 3 * (E.u or 0)
+    assert (E.u or 0) < 0.6 * (single.u or 0)
+    assert abs((joint.parameters["C"].value or 0) - 8000) < 3 * (joint.parameters["C"].u or 0)
+
+
+def test_E_over_v0_is_found_and_one_E_is_said_not_to_do():
+    fits = _joint_drops(0.1)
+    joint = fit_jointly(fits, law=True)
+    n = joint.parameters["n"]
+    assert abs((n.value or 0) - 0.1) < 3 * (n.u or 0)
+    assert n.lo is not None
+    assert n.lo > 0.05
+    assert joint.agree
+    assert not fit_jointly(fits, law=False).agree
+
+
+def test_a_joint_fit_says_what_it_lacks():
+    fits = _joint_drops(0.0, 2)
+    with pytest.raises(NotFitted, match="takes 3 fitted drops"):
+        fit_jointly(fits, law=True)
+    plate = drop(PLATE, 1)
+    other = fit_record(plate.record, plate.impact)
+    with pytest.raises(NotFitted, match="different models"):
+        fit_jointly([*fits, other], law=False)
+    with pytest.raises(NotFitted, match="within 5 %"):
+        fit_jointly([fits[0], fits[0], fits[0]], law=True)

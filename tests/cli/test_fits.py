@@ -131,3 +131,27 @@ def test_a_force_past_the_range_is_told_before_arming(tmp_path: Path) -> None:
     told = [e.get("code") for e in events]
     assert "force-beyond-range" in told
     assert [e["event"] for e in events].index("armed") > told.index("force-beyond-range")
+
+
+def test_a_series_is_fitted_together(tmp_path: Path) -> None:
+    files = []
+    for k, v0 in enumerate((1.4, 2.0, 2.8)):
+        drop = drawn("flexed plate", np.random.default_rng([6, k]), E_GPa=3.4, C=6000.0, v0=v0)
+        table = np.column_stack((np.arange(drop.record.force.size) * drop.record.dt, drop.record.force))
+        files.append(tmp_path / f"drop{k}.csv")
+        np.savetxt(files[-1], table, delimiter=",", header="time_s,force_N", comments="", fmt="%.9g")
+    (tmp_path / "drops.csv").write_text(
+        "file,v0,u_v0\n" + "".join(f"drop{k}.csv,{v},0.01\n" for k, v in enumerate((1.4, 2.0, 2.8)))
+    )
+    (tmp_path / "test.toml").write_text(TEST.replace("v0 = 1.95\nu_v0 = 0.01\n", ""))
+    run("import", *files, "--test", tmp_path / "test.toml", "--table", tmp_path / "drops.csv", "--series", "plates",
+        "--data", tmp_path / "data")  # fmt: skip
+    ((found,), _) = run("series", "plates", "--data", tmp_path / "data", "--json")
+    assert [r["v0"]["value"] for r in found["runs"]] == [1.4, 2.0, 2.8]
+    E = found["joint"]["one_E"]["parameters"]["E"]
+    assert E["lo"] < 3.4e9 < E["hi"]
+    assert (
+        found["joint"]["E_over_v0"]["parameters"]["n"]["lo"] < 0 < found["joint"]["E_over_v0"]["parameters"]["n"]["hi"]
+    )
+    _, err = run("series", "none", "--data", tmp_path / "data", code=1)
+    assert "no run of a series 'none'" in err

@@ -1,0 +1,52 @@
+"""`droptower series`: what a series of drops says together."""
+
+from typing import Annotated, Any
+
+import typer
+
+from api.commands.options import Data, Json
+from api.commands.show import EDGE, print_json, value_with_u
+
+
+def series(
+    name: Annotated[str, typer.Argument(help="Name of the series.", metavar="NAME")], data: Data, as_json: Json = False
+) -> None:
+    """Fit every run of a series, and all of them together: one E, and E over v0."""
+    from api.series import series_of
+    from daq.store import Store
+
+    found = series_of(Store(data), name)
+    if as_json:
+        print_json(found)
+    else:
+        _print(found)
+
+
+def _print(found: dict[str, Any]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console()
+    names = list(dict.fromkeys(n for run in found["runs"] for n in run["fit"]))
+    table = Table(title=found["series"], title_justify="left")
+    for title in ("run", "specimen", "v0, m/s", *(f"{n}, {'GPa' if n == 'E' else 'kg/s'}" for n in names)):
+        table.add_column(title)
+    for run in found["runs"]:
+        values = [run["fit"].get(n) for n in names]
+        cells = [value_with_u(p["value"], p["u_total"], 1e-9 if p["unit"] == "Pa" else 1) if p else "–" for p in values]
+        table.add_row(run["run"], run["specimen"] or "", value_with_u(run["v0"]["value"], run["v0"]["u"]), *cells)
+    console.print(table)
+    titles = {"one_E": "all drops, one E", "E_over_v0": "all drops, E = E_ref·(v0/v_ref)^n"}
+    for key, joint in found["joint"].items():
+        if joint is None:
+            continue
+        table = Table(title=f"{titles[key]} at {joint['v_ref']:.3g} m/s", title_justify="left")
+        for title in ("parameter", "value ± standard uncertainty", "95 %", "unit", "verdict"):
+            table.add_column(title)
+        for name, p in joint["parameters"].items():
+            unit, factor = EDGE.get(p["unit"], (p["unit"], 1.0))
+            ends = " to ".join("…" if p[end] is None else f"{p[end] * factor:.4g}" for end in ("lo", "hi"))
+            table.add_row(name, value_with_u(p["value"], p["u"], factor), ends, unit, p["verdict"])
+        console.print(table)
+    for warning in found["warnings"]:
+        console.print(f"! {warning['code']}: {warning['text']}", highlight=False, markup=False)
