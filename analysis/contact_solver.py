@@ -93,7 +93,7 @@ class Solution:
 def force_of(model: Model, v: Array, alpha1: Array) -> Array:
     """Contact force, N."""
     spring = model.K_i * np.maximum(alpha1, 0.0) ** 1.5
-    return spring + model.C * v if model.kind == "parallel" else spring
+    return spring * (1 + model.chi * v) + model.C * v if model.kind == "parallel" else spring
 
 
 def _right_side(model: Model) -> tuple[Array, Callable[[Array], Array], Callable[[Array], Array]]:
@@ -107,8 +107,9 @@ def _right_side(model: Model) -> tuple[Array, Callable[[Array], Array], Callable
 
         def jac_parallel(Y: Array) -> Array:
             J = np.zeros((len(Y), 3, 3))
-            J[:, V, V] = -model.C / m
-            J[:, V, ALPHA1] = -1.5 * K * np.sqrt(np.maximum(Y[:, ALPHA1], 0.0)) / m
+            root = np.sqrt(np.maximum(Y[:, ALPHA1], 0.0))
+            J[:, V, V] = -(model.C + model.chi * K * root**3) / m
+            J[:, V, ALPHA1] = -1.5 * K * root * (1 + model.chi * Y[:, V]) / m
             J[:, DELTA, V] = J[:, ALPHA1, V] = 1.0
             return J
 

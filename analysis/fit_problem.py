@@ -20,7 +20,7 @@ from analysis.record import Array
 
 LN_E, FLOW, DAMPER, V0, T0, LEVEL, MODES = range(7)
 PER_MODE = 4
-SLOWEST = 4.0
+SLOWEST = 2.5
 """Periods of a ringing in a contact, at the least: what is slower is the contact's own shape."""
 _FROM_REST = 0.2
 """Of its amplitude: what the cosine of a ringing may be; the sensor is at rest before contact."""

@@ -69,12 +69,18 @@ def on_layer(chi: float, nu: float) -> float:
     return 1 + sum(k * chi**n for n, k in enumerate(layer(nu), 1))
 
 
+def hunt_crossley(restitution: float, v0: float) -> float:
+    """χ in s/m of F = K_i·α^(3/2)·(1 + χ·v): 1.5·(1 − ε)/v0 (Hunt and Crossley, J. Appl. Mech. 42 (1975) 440)."""
+    return 1.5 * (1 - restitution) / v0
+
+
 @dataclass(frozen=True)
 class Model:
     """Constants of a contact, SI.
 
     mass : kg; K_i : N/m^1.5; K_d : N/m, inf on a rigid support; C_i : kg/s in series, inf without; C_d : kg/s of the
-    plate; C : kg/s beside the spring (parallel); g : m/s²
+    plate; C : kg/s beside the spring (parallel); chi : s/m of a dashpot that grows with it, F = K_i·α^(3/2)·(1 + χ·v)
+    (parallel; Hunt and Crossley); g : m/s²
     """
 
     kind: Kind
@@ -84,6 +90,7 @@ class Model:
     C_i: float = math.inf
     C_d: float = 0.0
     C: float = 0.0
+    chi: float = 0.0
     g: float = 9.80665
 
     def __post_init__(self) -> None:
@@ -96,7 +103,7 @@ class Model:
         for name in ("mass", "K_i", "K_d", "C_i"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} has to be above 0, not {getattr(self, name):g}")
-        for name in ("C_d", "C", "g"):
+        for name in ("C_d", "C", "chi", "g"):
             if not (0 <= getattr(self, name) < math.inf):
                 raise ValueError(f"{name} has to be 0 or more, and finite, not {getattr(self, name):g}")
 

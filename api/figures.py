@@ -65,7 +65,9 @@ def save_fit(fit: Fit, path: Path) -> None:
     names = profiled(fit)
     figure = Figure(figsize=(10, 7.2), layout="constrained")
     rows: Any = figure.subfigures(2, 1, height_ratios=(3, 2.2))
-    (time, loop), (left, apart) = rows[0].subplots(2, 2, height_ratios=(2, 1.2))
+    columns: Any = rows[0].subfigures(1, 2)
+    time, left = columns[0].subplots(2, 1, height_ratios=(2, 1), sharex=True)
+    loop, apart = columns[1].subplots(2, 1)
     time.plot(c["t"] * 1e3, c["force"], color="0.65", linewidth=0.8, label="record")
     time.plot(c["t"] * 1e3, c["model"], label=f"{fit.problem.kind} model", **STYLES[0])
     time.set(ylabel="Contact force (N)")
@@ -79,7 +81,9 @@ def save_fit(fit: Fit, path: Path) -> None:
         if float(np.abs(parts[key]).max()) > 0:
             apart.plot(t * 1e3, parts[key] * 1e3, label=label, **style)
     apart.set(xlabel="Time from contact (ms)", ylabel="Displacement (mm)")
-    apart.legend(frameon=False, fontsize="small")
+    apart.legend(frameon=False, fontsize="small", loc="center right", bbox_to_anchor=(1.0, 0.55))
+    apart.margins(x=0.25)
+    apart.set_xlim(left=0)
     axes = rows[1].subplots(1, len(names), squeeze=False)[0]
     for each, name in zip(axes, names, strict=True):
         value, rise, unit = profile(fit, name)

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from analysis.contact_solver import solve
-from analysis.models import Model, contact_stiffness, plate_stiffness
+from analysis.models import Model, contact_stiffness, hunt_crossley, plate_stiffness
 from analysis.predict import elements, predict
 from sim_device import mechanics
 
@@ -177,3 +177,21 @@ def test_constants_that_no_contact_has_are_named(change: dict[str, float], word:
         replace(CASES["flexed"], **change)
     with pytest.raises(ValueError, match="v0"):
         solve(CASES["flexed"], 0.0)
+
+
+@pytest.mark.parametrize("restitution", [0.95, 0.8])
+def test_hunt_and_crossley_begin_without_a_jump_and_rebound_as_said(restitution: float):
+    chi = hunt_crossley(restitution, 2.0)
+    solution = solve(Model("parallel", 0.503, K_I, chi=chi, g=0.0), 2.0)
+    assert solution.force(np.array([1e-7]))[0] < 1e-3 * solution.force(np.linspace(0, solution.end, 999)).max()
+    eps = -float(solution.y[-1, 0]) / 2.0
+    assert eps == pytest.approx(restitution, abs=0.04)  # their law is of first order in 1 − ε
+
+    def rates(_: float, y: np.ndarray) -> list[float]:
+        force = K_I * max(y[1], 0.0) ** 1.5 * (1 + chi * y[0])
+        return [-force / 0.503, y[0]]
+
+    t = np.linspace(0, 0.98 * solution.end, 400)
+    reference = solve_ivp(rates, (0, t[-1]), [2.0, 0.0], "DOP853", t, rtol=1e-12, atol=1e-14)
+    expected = K_I * np.maximum(reference.y[1], 0) ** 1.5 * (1 + chi * reference.y[0])
+    assert np.abs(solution.force(t) - expected).max() < 1e-6 * expected.max()

@@ -77,3 +77,13 @@ def test_other_commands_load_no_figures_and_no_solver(command: list[str]) -> Non
     )
     done = subprocess.run([sys.executable, "-c", code, *command], capture_output=True, text=True)
     assert done.stderr.splitlines()[-1] == "[]", done.stderr
+
+
+def test_a_compliant_tip_and_the_dashpot_of_hunt_and_crossley() -> None:
+    def found(symbol: str, kind: str, *more: str) -> float:
+        return json.loads(run(kind, *DROP, "--json", *more).stdout)["findings"][symbol]["value"]
+
+    assert 0.985 < found("F_M", "conservative", "--tip-E-GPa", "210") / found("F_M", "conservative") < 0.999
+    assert abs(found("eps_exact", "parallel", "--restitution", "0.9") - 0.9) < 0.02
+    assert run("series", *DROP, "--restitution", "0.9").returncode == 2
+    assert run("parallel", *DROP, "--restitution", "1.9").returncode == 2
