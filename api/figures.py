@@ -1,7 +1,7 @@
 """Figures, each in one place: drawn for paper, readable in grey."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -51,7 +51,7 @@ def save_model(solution: Solution, path: Path) -> None:
     _save(figure, path)
 
 
-def save_fit(fit: Fit, path: Path) -> None:
+def save_fit(fit: Fit, path: Path | BinaryIO) -> None:
     """A record with its model and what is left, the loop, the elements apart, and the profiles of the parameters.
 
     Raises
@@ -82,8 +82,7 @@ def save_fit(fit: Fit, path: Path) -> None:
             apart.plot(t * 1e3, parts[key] * 1e3, label=label, **style)
     apart.set(xlabel="Time from contact (ms)", ylabel="Displacement (mm)")
     apart.legend(frameon=False, fontsize="small", loc="center right", bbox_to_anchor=(1.0, 0.55))
-    apart.margins(x=0.25)
-    apart.set_xlim(left=0)
+    apart.set_xlim(0, 1.5e3 * float(t[-1]))
     axes = rows[1].subplots(1, len(names), squeeze=False)[0]
     for each, name in zip(axes, names, strict=True):
         value, rise, unit = profile(fit, name)
@@ -92,7 +91,10 @@ def save_fit(fit: Fit, path: Path) -> None:
         each.set(xlabel=f"{name} ({unit})", ylabel="Rise of χ²", ylim=(0, 9))
     for each in (time, loop, left, apart, *axes):
         _plain(each)
-    _save(figure, path)
+    if isinstance(path, Path):
+        _save(figure, path)
+    else:
+        figure.savefig(path, format="svg")
 
 
 def _plain(axes: Any) -> None:

@@ -1,6 +1,7 @@
 """Routes of runs: the list, one run's answer, its files."""
 
 import base64
+import io
 import tempfile
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -12,6 +13,7 @@ from starlette.background import BackgroundTask
 from api.answer import analysed, answer_of
 from api.http import links
 from api.http.caching import tag, tag_of_folder, tagged, unchanged
+from api.http.errors import Refusal
 from api.http.queries import cursor, moment, only_known
 from api.http.rendering import plain
 from api.http.shared import Shared
@@ -108,6 +110,25 @@ def get_fit(
     answer = analysed(data, model, tuple(correct or ())) if model or correct else answer_of(shared.store, run)
     body = {"run": run, "fit": answer["fit"], "warnings": answer["warnings"], "links": links.of_run(run)}
     return JSONResponse(plain(body))
+
+
+@router.get("/runs/{run}/fit.svg", response_class=Response)
+def get_figure(request: Request, shared: Shared, run: str) -> Response:
+    """The record with its model, what is left, the loop, the elements apart, and the profiles of the parameters."""
+    from analysis.fit import NotFitted
+    from api.figures import save_fit  # loads what draws
+    from api.fitting import fit_of
+
+    trace = shared.traces.get(run)
+    etag = tag(trace.sha256, "fit.svg")
+    if (same := unchanged(request, etag)) is not None:
+        return same
+    drawn = io.BytesIO()
+    try:
+        save_fit(fit_of(trace.run), drawn)
+    except NotFitted as e:
+        raise Refusal(404, "not-fitted", str(e)) from None
+    return tagged(Response(drawn.getvalue(), media_type="image/svg+xml"), etag)
 
 
 @router.get("/runs/{run}/raw", response_class=FileResponse)

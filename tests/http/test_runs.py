@@ -148,3 +148,29 @@ def test_exports_hold_every_sample(client: httpx2.Client, runs: list[str]) -> No
         assert len(f["entry/trace/force"]) == 6000
         assert math.isclose(f["entry/analysis/results/F_M"][()], 1050, rel_tol=0.01)
     assert client.get(f"/api/v1/runs/{runs[-1]}/export?format=xls").status_code == 422
+
+
+def test_the_fit_is_served_as_numbers_and_as_a_figure(client: httpx2.Client, runs: list[str]) -> None:
+    run = next(r for r in runs if client.get(f"/api/v1/runs/{r}").json()["fit"] is not None)
+    body = client.get(f"/api/v1/runs/{run}/fit").json()
+    assert body["fit"]["parameters"]["E"]["unit"] == "Pa"
+    other = client.get(f"/api/v1/runs/{run}/fit", params={"model": "conservative"}).json()
+    assert other["fit"]["model"] == "conservative"
+    assert client.get(f"/api/v1/runs/{run}").json()["fit"]["model"] != "conservative", (
+        "the answer kept is the support's"
+    )
+    figure = client.get(f"/api/v1/runs/{run}/fit.svg")
+    assert figure.headers["content-type"].startswith("image/svg+xml")
+    assert figure.text.rstrip().endswith("</svg>")
+    again = client.get(f"/api/v1/runs/{run}/fit.svg", headers={"If-None-Match": figure.headers["etag"]})
+    assert again.status_code == 304
+
+
+def test_a_run_without_a_fit_says_why(client: httpx2.Client, runs: list[str]) -> None:
+    run = next(r for r in runs if client.get(f"/api/v1/runs/{r}").json()["fit"] is None)
+    body = client.get(f"/api/v1/runs/{run}/fit").json()
+    assert body["fit"] is None
+    assert "not-fitted" in [w["code"] for w in body["warnings"]]
+    figure = client.get(f"/api/v1/runs/{run}/fit.svg")
+    assert figure.status_code == 404
+    assert figure.json()["error"]["code"] == "not-fitted"
