@@ -25,14 +25,16 @@ demo: setup
 test: .venv/installed-dev
 	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest --numprocesses 2 --dist loadscope
 
-# How often the 95 % intervals of the events hold the truth; docs/method.md quotes it.
+# How often the 95 % intervals of events and of fits hold the truth; docs/method.md and docs/fits.md quote them.
 coverage: .venv/installed-dev
 	$(BIN)/python bench/coverage_events.py
+	$(BIN)/python bench/coverage_fits.py
 
-# Readout and storage against bare loops on the same wires and disk; ten minutes, most of it at 115,200 baud.
+# Readout and storage against bare loops on the same wires and disk, fits against peers; ten minutes, most of it at 115,200 baud.
 bench: .venv/installed-dev
 	$(BIN)/python bench/wires.py
 	$(BIN)/python bench/durable.py
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/fits.py
 
 # Every fault on every wire, a quarter of an hour; the table goes into the manual. CI plays a seeded draw.
 FAULTS ?= --write docs/faults.md

@@ -118,8 +118,8 @@ def _closes(window: Window, impact: Impact) -> None:
     weight = impact.g * window.length / window.v0.value
     if not 0.9 < ratio < 2.2 + weight:
         raise NotFitted(
-            f"no model is fitted: the energy does not close; the impulse is {ratio:.3g} times m·v0, a contact has 1 to "
-            "2: is the force in N (not kN), the mass in kg, v0 in m/s?"
+            f"no model is fitted: the energy does not close; the impulse is {ratio:.3g} times m·v0, a contact that "
+            "turns the dart has 1 to 2: did the specimen fail, or are force, mass and v0 not in N, kg and m/s?"
         )
 
 

@@ -40,7 +40,9 @@ _INTERPOLATE = np.linalg.inv(np.vander(np.concatenate((np.zeros(1), _C)), 4, inc
 """Values at 0 and the three nodes → coefficients of the cubic through them."""
 
 STEPS, FINEST, GRADE = 100.0, 40_000.0, 0.15
-"""Steps a contact without grading, the finest step's share of it, and a step's share of the time to either end."""
+"""Steps a contact without grading, the finest step's share of it, and a step's share of the time to either end,"""
+SLOWER = 10.0
+"""that is smaller where the plate's damper, slow against the contact, shapes its beginning."""
 LONGEST = 20.0
 """Times the expected contact, after which a dart that has not parted lies on the specimen."""
 LN_E, FLOW, DAMPER, SPEED, TIME = 0, 1, 2, 3, 4
@@ -231,15 +233,15 @@ def contact(constants, times, force, slopes):
     cubic, speed, by, by_v = np.empty(4), np.empty(4), np.empty((4, 4)), np.empty((4, 4))
     before = np.zeros((4, 3))
     span = 2.94 * (1.25 * m * v0 * v0 / K) ** 0.4 / v0 + math.pi * math.sqrt(m * q)
-    longest, finest = span / STEPS, span / FINEST
+    longest, finest, grade = span / STEPS, span / FINEST, GRADE / (1 + SLOWER * theta / span)
     t, v, delta, alpha, old = 0.0, v0, 0.0, 0.0, 0.0
     slope, at, n = v0, 0, times.shape[0]
     while at < n and times[at] < 0:
         at += 1
     while t < LONGEST * span:
-        h = min(longest, max(finest, GRADE * t))
+        h = min(longest, max(finest, grade * t))
         if slope < 0:
-            h = min(h, max(finest, GRADE * alpha / -slope))
+            h = min(h, max(finest, grade * alpha / -slope))
         g = gravity - math.copysign(drag, v)
         low, high, g_low, g_high, parted = 0.0, h, 0.0, 0.0, False
         for attempt in range(60):

@@ -71,6 +71,10 @@ def fitted(
     answer["validity"] = checked
     warnings += [{"code": c.code, "text": c.text} for c in cautions]
     answer["measured"] = _beside(answer, findings, test)
+    mark = test.measured.imprint_diameter_mm
+    if answer["compared"] is not None and mark is not None:
+        # A dashpot beside the spring leaves no mark (P2); one in series does.
+        answer["compared"]["by_the_mark"] = "series" if mark > 0 else "parallel"
     return answer, findings, warnings
 
 

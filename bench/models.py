@@ -1,13 +1,23 @@
-"""The papers' numbers from their own constants: P1 Table 1 and P2's marks, as docs/models.md shows them.
+"""The models against scipy; the papers' numbers from their own constants: P1 Table 1, P2's marks. For docs/models.md.
 
 .venv/bin/python bench/models.py
 """
 
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
 from scipy.optimize import brentq
 
-from analysis.contact_solver import solve
-from analysis.models import Model, contact_stiffness, plate_stiffness
-from analysis.predict import predict
+sys.path[:0] = [str(Path(__file__).resolve().parents[1] / part) for part in ("", "tests", "tests/analysis")]
+
+from test_models import CASES, papers_form  # noqa: E402  after the path, like the rest
+
+from analysis.contact_solver import solve  # noqa: E402
+from analysis.fit_problem import kernel  # noqa: E402
+from analysis.models import Model, contact_stiffness, plate_stiffness  # noqa: E402
+from analysis.predict import predict  # noqa: E402
 
 TIP = 6.35e-3
 ROWS = (
@@ -23,8 +33,27 @@ def value(model: Model, v0: float, symbol: str) -> float:
     return float(predict(solve(model, v0), TIP).values[symbol].value or 0.0)
 
 
+def against_scipy() -> None:
+    """The largest error of F(t), in F_M, of kernel and of the plain solver against scipy at 1e-12, 0.5 to 4 m/s."""
+    print("| model | kernel, of F_M | plain solver, of F_M |\n|---|---|---|")
+    for name, model in CASES.items():
+        worst = [0.0, 0.0]
+        for v0 in (0.5, 2.0, 4.0):
+            solution = solve(model, v0)
+            t = np.linspace(0, 0.999 * solution.end, 300)
+            expected, force = papers_form(model, v0, t), np.empty(t.size)
+            q = 0.0 if math.isinf(model.K_d) else 1 / model.K_d
+            constants = [model.mass, model.g, 0, model.K_i, model.flow, q, model.C_d * q, model.C, v0, 1, 0, 0, 0, 0]
+            kernel().contact(np.array(constants, dtype=float), t, force, np.empty((0, 0)))
+            for k, other in enumerate((force, solution.force(t))):
+                worst[k] = max(worst[k], float(np.abs(other - expected).max() / expected.max()))
+        print(f"| {name} | {worst[0]:.0e} | {worst[1]:.0e} |")
+    print()
+
+
 def main() -> None:
-    """Print both."""
+    """Print all."""
+    against_scipy()
     print("| v0, m/s | F_M′ printed, N | found | α_M′ printed, mm | found | ε′ printed | found |")
     print("|---|---|---|---|---|---|---|")
     for v0, E, C_i, C_d, F_M, alpha_M, eps in ROWS:

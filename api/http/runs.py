@@ -4,7 +4,7 @@ import base64
 import io
 import tempfile
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from fastapi import APIRouter, Depends, Query, Request
 from fastapi.responses import FileResponse, JSONResponse, Response
@@ -21,7 +21,12 @@ from daq.catalog import FILTERS, as_json
 from daq.export import export_csv, export_nexus
 from daq.test_file import TestFile
 
+if TYPE_CHECKING:
+    from analysis.fit import Fit
+
 MOST_RUNS = 1000
+CURVE = 500
+"""Points of a curve."""
 router = APIRouter(tags=["runs"], dependencies=[Depends(only_known)])
 Filter = Annotated[str | None, Query(max_length=200)]
 
@@ -112,22 +117,41 @@ def get_fit(
     return JSONResponse(plain(body))
 
 
+@router.get("/runs/{run}/fit/curves")
+def get_curves(shared: Shared, run: str) -> Response:
+    """Record, model, ringing and what is left (N) over t (s from contact); the elements apart (m) with the force."""
+    from analysis.fit_answer import curves
+    from analysis.fit_profile import elements_of
+
+    fit = _fit(shared, run)
+    parts, t = elements_of(fit, CURVE)
+    of_record = {key: values.tolist() for key, values in curves(fit, CURVE).items()}
+    apart = {"t": t.tolist(), **{key: values.tolist() for key, values in parts.items()}}
+    body = {"run": run, "model": fit.problem.kind, "record": of_record, "elements": apart}
+    return JSONResponse(plain(body))
+
+
+def _fit(shared: Shared, run: str) -> "Fit":
+    from analysis.fit import NotFitted
+    from api.fitting import fit_of
+
+    try:
+        return fit_of(shared.traces.get(run).run)
+    except NotFitted as e:
+        raise Refusal(404, "not-fitted", str(e)) from None
+
+
 @router.get("/runs/{run}/fit.svg", response_class=Response)
 def get_figure(request: Request, shared: Shared, run: str) -> Response:
     """The record with its model, what is left, the loop, the elements apart, and the profiles of the parameters."""
-    from analysis.fit import NotFitted
     from api.figures import save_fit  # loads what draws
-    from api.fitting import fit_of
 
     trace = shared.traces.get(run)
     etag = tag(trace.sha256, "fit.svg")
     if (same := unchanged(request, etag)) is not None:
         return same
     drawn = io.BytesIO()
-    try:
-        save_fit(fit_of(trace.run), drawn)
-    except NotFitted as e:
-        raise Refusal(404, "not-fitted", str(e)) from None
+    save_fit(_fit(shared, run), drawn)
     return tagged(Response(drawn.getvalue(), media_type="image/svg+xml"), etag)
 
 

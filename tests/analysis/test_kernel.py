@@ -38,7 +38,7 @@ def constants(kind: Kind, C_i: float = math.inf, C_d: float = 0.0, C: float = 0.
     if K_d is None:
         K_d = plate_stiffness(D, RING, E, NU) if kind == "flexed" else math.inf
     return np.array([m, g, 0.0, K, 1 / C_i, 1 / K_d, C_d / K_d, C, v0, 1.0, 0, 0, 0, 0]), Model(
-        kind, m, K, K_d, C_i, C_d, C, g
+        kind, m, K, K_d, C_i, C_d, C, g=g
     )
 
 

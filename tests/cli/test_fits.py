@@ -147,7 +147,7 @@ def test_a_series_is_fitted_together(tmp_path: Path) -> None:
     run("import", *files, "--test", tmp_path / "test.toml", "--table", tmp_path / "drops.csv", "--series", "plates",
         "--data", tmp_path / "data")  # fmt: skip
     ((found,), _) = run("series", "plates", "--data", tmp_path / "data", "--json")
-    assert [r["v0"]["value"] for r in found["runs"]] == [1.4, 2.0, 2.8]
+    assert sorted(r["v0"]["value"] for r in found["runs"]) == [1.4, 2.0, 2.8]
     E = found["joint"]["one_E"]["parameters"]["E"]
     assert E["lo"] < 3.4e9 < E["hi"]
     assert (

@@ -162,6 +162,11 @@ def test_the_fit_is_served_as_numbers_and_as_a_figure(client: httpx2.Client, run
     figure = client.get(f"/api/v1/runs/{run}/fit.svg")
     assert figure.headers["content-type"].startswith("image/svg+xml")
     assert figure.text.rstrip().endswith("</svg>")
+    curves = client.get(f"/api/v1/runs/{run}/fit/curves").json()
+    parts = curves["elements"]
+    total = [sum(parts[k][i] for k in ("alpha_1", "alpha_2", "alpha_3")) for i in range(len(parts["t"]))]
+    assert total == pytest.approx(parts["alpha"], abs=1e-8)
+    assert len(curves["record"]["force"]) == len(curves["record"]["model"])
     again = client.get(f"/api/v1/runs/{run}/fit.svg", headers={"If-None-Match": figure.headers["etag"]})
     assert again.status_code == 304
 
