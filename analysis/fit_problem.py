@@ -22,6 +22,8 @@ LN_E, FLOW, DAMPER, V0, T0, LEVEL, MODES = range(7)
 PER_MODE = 4
 SLOWEST = 2.5
 """Periods of a ringing in a contact, at the least: what is slower is the contact's own shape."""
+_HARDLY = 1e-9
+"""kg/s."""
 _FROM_REST = 0.2
 """Of its amplitude: what the cosine of a ringing may be; the sensor is at rest before contact."""
 Corrected = Literal["overhang", "finite-thickness"]
@@ -91,7 +93,8 @@ class Problem:
             if "overhang" in self.corrections:
                 assert i.diameter is not None
                 q /= overhang(i.diameter / 2, i.support_radius, nu)
-        beside = x[DAMPER] if self.kind == "parallel" else 0.0
+        # Not quite 0: the kernel tells by it that a dashpot is there, and how the force would follow it.
+        beside = max(float(x[DAMPER]), _HARDLY) if self.kind == "parallel" else 0.0
         lag = x[DAMPER] * q if self.kind == "flexed" else 0.0
         base = (0.0, 0.0, 0.0, 0.0)
         if "finite-thickness" in self.corrections:

@@ -267,3 +267,12 @@ def test_a_joint_fit_says_what_it_lacks():
         fit_jointly([*fits, other], law=False)
     with pytest.raises(NotFitted, match="within 5 %"):
         fit_jointly([fits[0], fits[0], fits[0]], law=True)
+
+
+def test_a_dashpot_beside_the_spring_that_is_not_there_has_an_upper_limit():
+    d = drop(REST, 5, C=3e4)  # in series: what a dashpot beside the spring cannot be
+    p = parameters(fit_record(d.record, d.impact, "parallel"))["C"]
+    assert p.value is not None
+    assert p.u is not None
+    assert p.u < 1e3
+    assert p.hi is None or p.hi < 1e4
