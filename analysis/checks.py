@@ -90,34 +90,28 @@ def after(record: Record, impact: Impact, events: Events, answer: Answer) -> Non
             f"The record {where} within the contact, so that contact time, impulse and restitution are not known: "
             "record a longer window, or trigger with more samples before contact.",
         )
-    elif max(events.start.chi2, events.end.chi2) > _UNLIKE:
-        worst = max(events.start.chi2, events.end.chi2)
-        which = "first contact" if events.start.chi2 > events.end.chi2 else "end of contact"
-        answer.warn(
-            "edge-unlike-contact",
-            f"Force around the {which} does not rise like a contact (reduced χ² {worst:.3g}, "
-            f"limit {_UNLIKE:g}): something touched earlier, stuck or rang. Its time is less sure than its u says.",
-        )
+    else:
+        _edges(events.start.chi2, 0.0 if answer.values["failed"].value else events.end.chi2, answer)
     _saturation(record, events, answer)
     _level_moved(events, answer)
     _restitution(answer)
     _energy(impact, answer)
 
 
+def _edges(start: float, end: float, answer: Answer) -> None:
+    """Reduced χ² of the two ends of contact; that of a failed specimen is none."""
+    worst = max(start, end)
+    if worst > _UNLIKE:
+        which = "first contact" if start > end else "end of contact"
+        answer.warn(
+            "edge-unlike-contact",
+            f"Force around the {which} does not rise like a contact (reduced χ² {worst:.3g}, "
+            f"limit {_UNLIKE:g}): something touched earlier, stuck or rang. Its time is less sure than its u says.",
+        )
+
+
 def _saturation(record: Record, events: Events, answer: Answer) -> None:
-    first = events.first
-    part = record.force[first : first + events.force.size]
-    why = None
-    if record.rails is not None:
-        half = 0.5 * (record.lsb or 0.0) + 1e-9 * abs(record.rails[1] - record.rails[0])
-        low, high = min(record.rails), max(record.rails)
-        touching = int(np.count_nonzero((part >= high - half) | (part <= low + half)))
-        if touching:
-            why = f"{touching} samples of the contact are at the end of the range ({low:.6g} to {high:.6g} N)"
-    if why is None:
-        flat = flat_top(part, events.peak, record.lsb or 0.0, events.contact.level.noise)
-        if flat:
-            why = f"the top is flat over {flat} equal samples at {float(part[events.peak]):.6g} N"
+    why = saturated(record, events)
     if why is not None:
         answer.forget(FROM_PEAK)
         answer.warn(
@@ -125,6 +119,22 @@ def _saturation(record: Record, events: Events, answer: Answer) -> None:
             f"The record is saturated: {why}. F_M_raw is a lower bound of the peak, and what rests on the peak or the "
             "impulse is not given: choose a larger range and drop again.",
         )
+
+
+def saturated(record: Record, events: Events) -> str | None:
+    """What shows that the contact is cut off at the end of the range, in words; None if it is not."""
+    first = events.first
+    part = record.force[first : first + events.force.size]
+    if record.rails is not None:
+        half = 0.5 * (record.lsb or 0.0) + 1e-9 * abs(record.rails[1] - record.rails[0])
+        low, high = min(record.rails), max(record.rails)
+        touching = int(np.count_nonzero((part >= high - half) | (part <= low + half)))
+        if touching:
+            return f"{touching} samples of the contact are at the end of the range ({low:.6g} to {high:.6g} N)"
+    flat = flat_top(part, events.peak, record.lsb or 0.0, events.contact.level.noise)
+    if flat:
+        return f"the top is flat over {flat} equal samples at {float(part[events.peak]):.6g} N"
+    return None
 
 
 def flat_top(force: Array, peak: int, lsb: float, noise: float) -> int:

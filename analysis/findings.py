@@ -26,6 +26,13 @@ UNITS: dict[str, str] = {
     "t_contact": "s",
     "alpha_perm": "m",
     "mark_diameter": "m",
+    "failed": "1",
+    "failure_kind": "1",
+    "t_failure": "s",
+    "F_failure": "N",
+    "alpha_failure": "m",
+    "E_failure": "J",
+    "confidence": "1",
     # beyond the contract
     "bounces": "1",
     "t_second": "s",
@@ -48,7 +55,7 @@ UNITS: dict[str, str] = {
 class Finding:
     """A value in `unit` with its standard uncertainty `u`; None where unknown."""
 
-    value: float | bool | None
+    value: float | bool | str | None
     unit: str
     u: float | None = None
 
@@ -91,6 +98,10 @@ class Answer:
             good_u = u if u is not None and math.isfinite(u) else None
             self.values[symbol] = Finding(float(value), UNITS[symbol], None if good_u is None else float(good_u))
 
+    def say(self, symbol: str, value: bool | str) -> None:
+        """Set `symbol` to a word, or to true or false."""
+        self.values[symbol] = Finding(value, UNITS[symbol])
+
     def forget(self, symbols: Iterable[str]) -> None:
         """Make `symbols` unknown again."""
         for symbol in symbols:
@@ -110,7 +121,7 @@ class Answer:
         return Findings(dict(self.values), list(self.warnings))
 
 
-def _plain(value: float | bool | None) -> float | bool | None:
-    if value is None or isinstance(value, bool):
+def _plain(value: float | bool | str | None) -> float | bool | str | None:
+    if value is None or isinstance(value, bool | str):
         return value
     return float(value) if math.isfinite(value) else None

@@ -12,10 +12,11 @@ import numpy as np
 
 from analysis.conditions import Impact
 from analysis.events import locate
+from analysis.failure import complete_failure
 from analysis.findings import Answer
 from analysis.fit_problem import MODES, T0, Corrected, Problem
 from analysis.fit_start import ringing_in, start_of
-from analysis.fit_window import Window, window_of
+from analysis.fit_window import Window, until, window_of
 from analysis.levenberg import Optimum, minimise
 from analysis.models import Kind
 from analysis.record import Array, Record
@@ -77,6 +78,9 @@ def fit_record(
     kind = kind or ("flexed" if impact.support == "ring" else "series")
     _allowed(impact, kind, corrections)
     window = window_of(record, events, v0)
+    failed = complete_failure(events, impact, v0)
+    if failed is not None:
+        window = until(window, failed.t)
     _closes(window, impact)
     return fit_window(window, impact, kind, corrections)
 

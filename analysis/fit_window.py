@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,6 +76,13 @@ def window_of(record: Record, events: Events, v0: Speed) -> Window:
         v0=v0,
         left_out=left_out,
     )
+
+
+def until(window: Window, failure: float) -> Window:
+    """The window without what follows a failure (s on the record's axis)."""
+    kept = window.kept & (window.t < failure - 2 * window.step)
+    why = "what follows the failure of the specimen was left out"
+    return replace(window, kept=kept, left_out=why if window.left_out is None else f"{window.left_out}, and {why}")
 
 
 def _railed(record: Record, events: Events) -> NDArray[np.bool_]:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from analysis import checks, restitution
+from analysis import checks, failure, restitution
 from analysis.conditions import Impact
 from analysis.events import Events, locate
 from analysis.findings import Answer, Findings
@@ -31,6 +31,7 @@ def analyze(record: Record, impact: Impact) -> Findings:
             return answer.done()
         _events(record, impact, events, answer)
         restitution.evaluate(record, impact, events, answer)
+        failure.evaluate(record, impact, events, answer)
         checks.after(record, impact, events, answer)
     return answer.done()
 

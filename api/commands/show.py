@@ -16,12 +16,14 @@ def print_json(line: dict[str, Any]) -> None:
     print(json.dumps(line, allow_nan=False), flush=True)
 
 
-def value_with_u(value: float | bool | None, u: float | None, factor: float = 1.0) -> str:
+def value_with_u(value: float | bool | str | None, u: float | None, factor: float = 1.0) -> str:
     """`1.234 ± 0.012`: the uncertainty to two digits, the value to the same place; `–` where there is none."""
     if value is None:
         return "–"
     if isinstance(value, bool):
         return "yes" if value else "no"
+    if isinstance(value, str):
+        return value
     value *= factor
     if not u:
         return f"{value:.4g}"

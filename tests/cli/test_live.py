@@ -105,6 +105,7 @@ def test_the_demo_agrees_with_what_the_emulator_was_set_to(tmp_path: Path) -> No
     done = subprocess.run([DROPTOWER, "demo", "--once", "--data", tmp_path / "d"], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "All 24 findings agree with the set values" in done.stdout
+    assert "all hold the set value" in done.stdout
     for published in ("709", "1045", "2.61"):
         assert published in done.stdout
     assert len(list((tmp_path / "d" / "runs").iterdir())) == 6
