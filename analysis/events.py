@@ -14,6 +14,7 @@ from analysis.onset import Edge, Rise, clean_edge, fit_edge
 from analysis.record import Array, Record
 from analysis.ringing import Ringing, find_ringing
 from analysis.second import find_second
+from analysis.speed import gate_speed, height_speed
 
 
 @dataclass(frozen=True)
@@ -63,10 +64,19 @@ def locate(record: Record, impact: Impact) -> Events | None:
     peak = contact.peak - first
     events = Events(contact, first, t, force, noise, contact.level.u * tip, None, None, None, peak, ringing)
     length = (stop - begin) * record.dt
-    start = None if contact.start is None else edge(events, impact, begin - first, peak, length, ending=False)
-    end = None if contact.end is None else edge(events, impact, stop - first, peak, length, ending=True)
+    v0 = _speed(record, impact, begin * record.dt)
+    start = None if contact.start is None else edge(events, impact, v0, begin - first, peak, length, ending=False)
+    end = None if contact.end is None else edge(events, impact, v0, stop - first, peak, length, ending=True)
     events = replace(events, start=start, end=end)
     return _with_bounces(record, impact, events)
+
+
+def _speed(record: Record, impact: Impact, contact: float) -> float | None:
+    """Speed at contact, m/s, as near as it is known before the contact is."""
+    if impact.v0:
+        return impact.v0
+    speed = gate_speed(record, impact, contact, 0.0) or height_speed(impact)
+    return None if speed is None or not speed.value > 0 else speed.value
 
 
 def _with_bounces(record: Record, impact: Impact, events: Events) -> Events:
@@ -97,7 +107,7 @@ def _with_bounces(record: Record, impact: Impact, events: Events) -> Events:
         peak=second.peak,
         ringing=None,
     )
-    onset = edge(again, impact, second.start, second.peak, (end - second.start) * record.dt, ending=False)
+    onset = edge(again, impact, impact.v0, second.start, second.peak, (end - second.start) * record.dt, ending=False)
     return replace(events, second=onset, bounces=bounces)
 
 
@@ -111,7 +121,9 @@ def corrected(record: Record, level: Level, first: int, last: int, begin: int) -
     return force
 
 
-def edge(events: Events, impact: Impact, at: int, peak: int, length: float, ending: bool) -> Edge | None:
+def edge(
+    events: Events, impact: Impact, v0: float | None, at: int, peak: int, length: float, ending: bool
+) -> Edge | None:
     """Sub-sample onset or end near sample `at` of the contact that peaks at sample `peak` and lasts `length` s."""
     t, force = events.t, events.force
     if ending:
@@ -120,11 +132,13 @@ def edge(events: Events, impact: Impact, at: int, peak: int, length: float, endi
     top = float(force[peak])
     last = min(at + int(length / step) + 1, force.size)
     impulse = float(np.sum(np.maximum(force[at:last], 0))) * step
-    restored = impulse / (impact.mass * impact.v0) if impact.v0 else 1.85
+    restored = impulse / (impact.mass * v0) if v0 else 1.85
     restored = min(max(restored, 1.3), 2.0)
-    # J = m·v0·(1 + ε) = m·v1·(1 + ε)/ε: the impulse itself says what m·v is.
+    # J = m·v0·(1 + ε) = m·v1·(1 + ε)/ε: the impulse itself says what m·v is, unless the specimen failed.
     eps = restored - 1
     slowing = restored / impulse / (eps if ending else 1.0)
+    if v0 and not ending:
+        slowing = min(slowing, 1.1 / (impact.mass * v0))
     # What yields for good under about 0.7·F_M cannot cost more energy than is lost.
     yields = (1 - eps) * impulse / (1.4 * top) / (eps if ending else 1.0)
     limit = min(0.4, max(0.003, 30 * events.noise / top)) * top

@@ -9,18 +9,20 @@ No filter touches the record: time and load come from a fit of the corner itself
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import ndtr
 
 from analysis.checks import saturated
 from analysis.conditions import Impact
-from analysis.events import Events
+from analysis.events import Events, edge
 from analysis.findings import Answer
 from analysis.kinematics import integrate
+from analysis.onset import Edge
 from analysis.record import Array, Record
 from analysis.restitution import speed_at_contact
+from analysis.ringing import find_ringing
 from analysis.speed import Speed
 
 _LOOK, _BEFORE, _AFTER = 60e-6, 120e-6, 30e-6
@@ -60,38 +62,54 @@ NOT_OF_A_FAILED_ONE = (
 """Findings that a specimen without rebound has not."""
 
 
-def evaluate(record: Record, impact: Impact, events: Events, answer: Answer) -> None:
-    """Put a complete failure into the answer, with speed, way and energy up to it; nothing where there is none.
+def evaluate(record: Record, impact: Impact, events: Events, answer: Answer) -> Events:
+    """Put a complete failure into the answer, with way and energy up to it; nothing where there is none.
+
+    Returns the events, first contact as the record before the failure has it.
 
     Up to the failure α = ∫v dt and E = ∫F·v dt (P1: E_a′ is the area under F–α up to it).
     """
     if saturated(record, events) is not None:
-        return
+        return events
     v0 = speed_at_contact(record, impact, events, Answer())
     found = None if v0 is None else complete_failure(events, impact, v0)
     if found is None or v0 is None or events.start is None:
-        return
-    path = integrate(events.t, events.force, events.start.t, found.t, impact.mass, v0.value, impact.g)
+        return events
+    start = _start(events, impact, v0, found)
+    answer.set("t_contact", start.t, start.u)
+    path = integrate(events.t, events.force, start.t, found.t, impact.mass, v0.value, impact.g)
     answer.forget(NOT_OF_A_FAILED_ONE)
     answer.say("failed", True)
     answer.say("failure_kind", "complete")
-    u_t = math.hypot(found.u_t, events.start.u)
-    answer.set("t_failure", found.t - events.start.t, u_t)
+    u_t, since = math.hypot(found.u_t, start.u), found.t - start.t
+    answer.set("t_failure", since, u_t)
     answer.set("F_failure", found.F, found.u_F)
     alpha, energy = float(path.alpha[-2]), float(path.energy[-2])
-    answer.set("alpha_failure", alpha, math.hypot(v0.u * (found.t - events.start.t), float(path.v[-2]) * u_t))
+    answer.set("alpha_failure", alpha, math.hypot(v0.u * since, float(path.v[-2]) * u_t))
     by_force = found.u_F / max(found.F, 1e-9)
     answer.set("E_failure", energy, energy * math.hypot(v0.u / v0.value, impact.u_gain, 0.3 * by_force))
     answer.set("confidence", found.confidence)
-    for symbol, value, u in (("F_M", found.F, found.u_F), ("t_M", found.t - events.start.t, u_t)):
+    for symbol, value, u in (("F_M", found.F, found.u_F), ("t_M", since, u_t)):
         answer.set(symbol, value, u)
     answer.set("l_M", *answer.get("alpha_failure"))
     answer.set("E_M", *answer.get("E_failure"))
     answer.warn(
         "specimen-failed",
-        f"The specimen failed {1e3 * (found.t - events.start.t):.3f} ms after contact at {found.F:.0f} N: the load was "
+        f"The specimen failed {1e3 * since:.3f} ms after contact at {found.F:.0f} N: the load was "
         "lost at once and the dart went on. F_M, t_M, l_M and E_M are those at failure; there is no restitution.",
     )
+    return replace(events, start=start)
+
+
+def _start(events: Events, impact: Impact, v0: Speed, found: Failure) -> Edge:
+    """First contact, once more: the ringing is told from what precedes the failure alone, which rings anew."""
+    assert events.start is not None
+    stop = int(np.searchsorted(events.t, found.t))
+    ringing = find_ringing(events.t[:stop], events.force[:stop], events.start.t, found.t, events.noise)
+    at = int(np.searchsorted(events.t, events.start.t))
+    length = found.t - events.start.t
+    start = edge(replace(events, ringing=ringing), impact, v0.value, at, stop - 1, length, ending=False)
+    return start if ringing is not None and start is not None else events.start
 
 
 def complete_failure(events: Events, impact: Impact, v0: Speed) -> Failure | None:

@@ -31,7 +31,7 @@ def analyze(record: Record, impact: Impact) -> Findings:
             return answer.done()
         _events(record, impact, events, answer)
         restitution.evaluate(record, impact, events, answer)
-        failure.evaluate(record, impact, events, answer)
+        events = failure.evaluate(record, impact, events, answer)
         checks.after(record, impact, events, answer)
     return answer.done()
 
