@@ -6,6 +6,7 @@ from analysis.fit import Fit, NotFitted
 from analysis.joint import fit_jointly
 from api.answer import answer_of
 from api.fitting import fit_of
+from api.rupture import Drop, rupture_of
 from daq.catalog import Catalog
 from daq.errors import StoreError
 from daq.store import Store
@@ -26,19 +27,24 @@ def series_of(store: Store, name: str) -> dict[str, Any]:
         raise StoreError(f"{store.folder} holds no run of a series {name!r}")
     runs: list[dict[str, Any]] = []
     fits: list[Fit] = []
+    drops: list[Drop] = []
     warnings: list[dict[str, str]] = []
     for row in reversed(rows):
         answer = answer_of(store, row.run)
         known = {} if answer["fit"] is None else answer["fit"]["parameters"]
         runs.append(
             {
-                "run": row.run, "specimen": row.specimen, "v0": answer["findings"]["v0"],
+                "run": row.run, "specimen": row.specimen,
+                **{symbol: answer["findings"][symbol] for symbol in ("v0", "F_M", "failed", "F_failure", "E_failure")},
                 "fit": {name: known[name] for name in OF_A_RUN if name in known},
                 "warnings": [w["code"] for w in answer["warnings"]],
             }
         )  # fmt: skip
+        drops.append((store.read(row.run), answer["findings"]))
+        if answer["findings"]["failed"]["value"] is True:
+            continue  # what is left of its record is no equal of the others
         try:
-            fits.append(fit_of(store.read(row.run)))
+            fits.append(fit_of(drops[-1][0]))
         except NotFitted as e:
             warnings.append({"code": "not-fitted", "text": f"{row.run}: {e}"})
     joint: dict[str, Any] = {}
@@ -56,7 +62,8 @@ def series_of(store: Store, name: str) -> dict[str, Any]:
                 f"{joint[key]['widened']:.1f} times as wide for it"
             )
             warnings.append({"code": f"drops-disagree-{key}".lower().replace("_", "-"), "text": text})
-    return {"series": name, "runs": runs, "joint": joint, "warnings": warnings}
+    rupture, more = rupture_of(drops)
+    return {"series": name, "runs": runs, **rupture, "joint": joint, "warnings": warnings + more}
 
 
 def _as_json(joint: Any) -> dict[str, Any]:

@@ -22,6 +22,35 @@ def series(
         _print(found)
 
 
+RUPTURE = {
+    "v0_fail": "speed at which half fail", "v0_survived_max": "fastest that survived",
+    "v0_failed_min": "slowest that failed", "F_rupture": "load at failure, mean",
+    "sigma_r": "stress at failure, P1 (15), natural logarithm",
+    "sigma_r_as_published": "the same as P1 printed it, log₁₀", "E_a": "½·m·v0_fail²",
+    "E_a_prime": "energy up to failure, mean",
+}  # fmt: skip
+
+
+def _rupture(found: dict[str, Any]) -> Any:
+    from rich.table import Table
+
+    table = Table(title="failure", title_justify="left")
+    for title in ("symbol", "value", "unit", "is"):
+        table.add_column(title)
+    for key, words in RUPTURE.items():
+        row = found[key]
+        if row is None:
+            continue
+        unit, factor = ("MPa", 1e-6) if row["unit"] == "Pa" else (row["unit"], 1.0)
+        if "lo" in row:
+            ends = " to ".join("…" if row[e] is None else f"{row[e] * factor:.4g}" for e in ("lo", "hi"))
+            shown = f"{row['value'] * factor:.4g} (95 %: {ends})"
+        else:
+            shown = value_with_u(row["value"], row.get("u"), factor)
+        table.add_row(key, shown, unit, words)
+    return table
+
+
 def _print(found: dict[str, Any]) -> None:
     from rich.console import Console
     from rich.table import Table
@@ -29,12 +58,21 @@ def _print(found: dict[str, Any]) -> None:
     console = Console()
     names = list(dict.fromkeys(n for run in found["runs"] for n in run["fit"]))
     table = Table(title=found["series"], title_justify="left")
-    for title in ("run", "specimen", "v0, m/s", *(f"{n}, {'GPa' if n == 'E' else 'kg/s'}" for n in names)):
+    for title in (
+        "run",
+        "specimen",
+        "v0, m/s",
+        "F_M, N",
+        "failed",
+        *(f"{n}, {'GPa' if n == 'E' else 'kg/s'}" for n in names),
+    ):
         table.add_column(title)
     for run in found["runs"]:
         values = [run["fit"].get(n) for n in names]
         cells = [value_with_u(p["value"], p["u_total"], 1e-9 if p["unit"] == "Pa" else 1) if p else "–" for p in values]
-        table.add_row(run["run"], run["specimen"] or "", value_with_u(run["v0"]["value"], run["v0"]["u"]), *cells)
+        table.add_row(run["run"], run["specimen"] or "", value_with_u(run["v0"]["value"], run["v0"]["u"]),
+                      value_with_u(run["F_M"]["value"], run["F_M"]["u"]),
+                      "yes" if run["failed"]["value"] else "", *cells)  # fmt: skip
     console.print(table)
     titles = {"one_E": "all drops, one E", "E_over_v0": "all drops, E = E_ref·(v0/v_ref)^n"}
     for key, joint in found["joint"].items():
@@ -48,5 +86,7 @@ def _print(found: dict[str, Any]) -> None:
             ends = " to ".join("…" if p[end] is None else f"{p[end] * factor:.4g}" for end in ("lo", "hi"))
             table.add_row(name, value_with_u(p["value"], p["u"], factor), ends, unit, p["verdict"])
         console.print(table)
+    if found["v0_fail"] is not None or found["F_rupture"] is not None:
+        console.print(_rupture(found))
     for warning in found["warnings"]:
         console.print(f"! {warning['code']}: {warning['text']}", highlight=False, markup=False)

@@ -1,0 +1,90 @@
+"""A series whose specimens fail from some speed on: where, at what load, stress and energy."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sim_device.fall import Motion
+from sim_device.sensors import signal, white
+from sim_device.settings import Hang, Rig, Sensor, Specimen
+
+DROPTOWER = Path(sys.executable).with_name("droptower")
+TEST = """
+[dart]
+mass_kg = 0.503
+tip_radius_mm = 6.35
+[specimen]
+thickness_mm = 4.6
+nu = 0.30
+[support]
+kind = "ring"
+radius_mm = 30
+[drop]
+catcher = true
+"""
+SPEEDS = (2.6, 3.0, 3.3, 3.5, 3.7, 4.0)
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory) -> dict:
+    """The answer of six CR-39 plates that fail at 1,800 N."""
+    here = tmp_path_factory.mktemp("series")
+    rows = ["file,v0,u_v0"]
+    for k, v0 in enumerate(SPEEDS):
+        specimen = Specimen(E_GPa=3.4, C_i=5000.0, C_d=10.0, fail_N=1800.0)
+        sensor = Sensor(noise_N=5, ringing=0.02)
+        rig = Rig(specimen=specimen, drop=Hang(None, v0, catcher=True), sensor=sensor)
+        motion = Motion(rig)
+        force = signal(rig, motion, 0, -1.5e-3, 2e-6, 4000) + 5 * white((k,), 0, 4000)
+        table = np.column_stack((np.arange(4000) * 2e-6, force))
+        np.savetxt(here / f"{k}.csv", table, delimiter=",", header="time_s,force_N", comments="", fmt="%.9g")
+        rows.append(f"{k}.csv,{v0},{0.005 * v0}")
+    (here / "drops.csv").write_text("\n".join(rows) + "\n")
+    (here / "test.toml").write_text(TEST)
+    files = [here / f"{k}.csv" for k in range(len(SPEEDS))]
+    data = ["--data", here / "data"]
+    command = [
+        "import",
+        *files,
+        "--test",
+        here / "test.toml",
+        "--table",
+        here / "drops.csv",
+        "--series",
+        "CR-39",
+        *data,
+    ]
+    subprocess.run([DROPTOWER, *command], check=True, capture_output=True)
+    done = subprocess.run([DROPTOWER, "series", "CR-39", *data, "--json"], check=True, capture_output=True, text=True)
+    shown = subprocess.run([DROPTOWER, "series", "CR-39", *data], check=True, capture_output=True, text=True)
+    assert "v0_fail" in shown.stdout
+    return json.loads(done.stdout)
+
+
+def test_the_bracket_and_the_interval(found: dict) -> None:
+    failing = {r["v0"]["value"]: r["failed"]["value"] for r in found["runs"]}
+    first = min(v for v, failed in failing.items() if failed)
+    assert found["v0_failed_min"]["value"] == first
+    assert found["v0_survived_max"]["value"] == max(v for v, failed in failing.items() if not failed)
+    limit = found["v0_fail"]
+    assert limit["lo"] < found["v0_survived_max"]["value"] < limit["value"] < first < limit["hi"]
+    assert found["E_a"]["value"] == pytest.approx(0.5 * 0.503 * limit["value"] ** 2)
+
+
+def test_load_stress_and_energy_at_failure(found: dict) -> None:
+    assert found["F_rupture"]["value"] == pytest.approx(1800, rel=0.02)
+    assert found["sigma_r"]["value"] == pytest.approx(198.9e6, rel=0.02)
+    assert found["sigma_r_as_published"]["value"] == pytest.approx(142.0e6, rel=0.02)
+    assert 2.0 < found["E_a_prime"]["value"] < 3.5
+    assert found["F_rupture"]["n"] == sum(bool(r["failed"]["value"]) for r in found["runs"])
+
+
+def test_what_survived_is_fitted_together(found: dict) -> None:
+    E = found["joint"]["one_E"]["parameters"]["E"]
+    assert E["lo"] < 3.4e9 < E["hi"]
