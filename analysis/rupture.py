@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import log_ndtr
 
-_SCATTER, _TIMES = 0.05, 2.0
+_SCATTER, _TIMES = 0.06, 2.0
 """Of ln v0: what specimens of one material scatter by, give or take a factor (lognormal, one standard deviation)."""
 _POINTS = 400
 _LEVEL = 0.95
@@ -31,7 +31,7 @@ class Limit:
 def failure_speed(v0: Sequence[float], failed: Sequence[bool]) -> Limit | None:
     """The speed at which half of the specimens fail, m/s; None where all survived or all failed.
 
-    ln v0_fail is flat before the drops, the scatter lognormal around 5 %; the interval holds 95 % of what is left.
+    ln v0_fail is flat before the drops, the scatter lognormal around 6 %; the interval holds 95 % of what is left.
     """
     speed, lost = np.asarray(v0, dtype=np.float64), np.asarray(failed, dtype=bool)
     if lost.all() or not lost.any():

@@ -12,6 +12,7 @@ from daq.errors import StoreError
 from daq.store import Store
 
 MOST = 10_000
+OF_FINDINGS = ("v0", "F_M", "t_c", "eps_exact", "failed", "F_failure", "E_failure")
 OF_A_RUN = ("E", "C_i", "C_d", "C")
 
 
@@ -35,7 +36,7 @@ def series_of(store: Store, name: str) -> dict[str, Any]:
         runs.append(
             {
                 "run": row.run, "specimen": row.specimen,
-                **{symbol: answer["findings"][symbol] for symbol in ("v0", "F_M", "failed", "F_failure", "E_failure")},
+                **{symbol: answer["findings"][symbol] for symbol in OF_FINDINGS},
                 "fit": {name: known[name] for name in OF_A_RUN if name in known},
                 "warnings": [w["code"] for w in answer["warnings"]],
             }

@@ -1,11 +1,12 @@
 """`droptower series`: what a series of drops says together."""
 
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from api.commands.options import Data, Json
-from api.commands.show import EDGE, print_json, value_with_u
+from api.commands.show import EDGE, print_json, tell, value_with_u
 
 
 def series(
@@ -20,6 +21,21 @@ def series(
         print_json(found)
     else:
         _print(found)
+
+
+def report(
+    name: Annotated[str, typer.Argument(help="Name of the series.", metavar="NAME")],
+    data: Data,
+    output: Annotated[Path, typer.Option("-o", "--output", help="FILE.html.", metavar="FILE")],
+) -> None:
+    """Write a series as one file that opens without a network: runs, figures, failure, models, method, checksums."""
+    from api.report import write_report
+    from daq.store import Store
+
+    if output.suffix != ".html":
+        raise typer.BadParameter(f"{output} does not end in .html; a browser prints it to PDF", param_hint="-o")
+    write_report(Store(data), name, output)
+    tell(f"{name} written to {output}")
 
 
 RUPTURE = {

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from playwright.sync_api import sync_playwright
 
 from sim_device.fall import Motion
 from sim_device.sensors import signal, white
@@ -32,8 +33,8 @@ SPEEDS = (2.6, 3.0, 3.3, 3.5, 3.7, 4.0)
 
 
 @pytest.fixture(scope="module")
-def found(tmp_path_factory: pytest.TempPathFactory) -> dict:
-    """The answer of six CR-39 plates that fail at 1,800 N."""
+def series_data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with six CR-39 plates that fail at 1,800 N."""
     here = tmp_path_factory.mktemp("series")
     rows = ["file,v0,u_v0"]
     for k, v0 in enumerate(SPEEDS):
@@ -61,6 +62,13 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> dict:
         *data,
     ]
     subprocess.run([DROPTOWER, *command], check=True, capture_output=True)
+    return here / "data"
+
+
+@pytest.fixture(scope="module")
+def found(series_data: Path) -> dict:
+    """The answer of the series."""
+    data = ["--data", series_data]
     done = subprocess.run([DROPTOWER, "series", "CR-39", *data, "--json"], check=True, capture_output=True, text=True)
     shown = subprocess.run([DROPTOWER, "series", "CR-39", *data], check=True, capture_output=True, text=True)
     assert "v0_fail" in shown.stdout
@@ -88,3 +96,32 @@ def test_load_stress_and_energy_at_failure(found: dict) -> None:
 def test_what_survived_is_fitted_together(found: dict) -> None:
     E = found["joint"]["one_E"]["parameters"]["E"]
     assert E["lo"] < 3.4e9 < E["hi"]
+
+
+def test_the_report_is_one_file_that_needs_no_network(found: dict, tmp_path: Path, series_data: Path) -> None:
+    out = tmp_path / "report.html"
+    subprocess.run([DROPTOWER, "report", "CR-39", "--data", series_data, "-o", out], check=True, capture_output=True)
+    text = out.read_text(encoding="utf-8")
+    assert "http" not in text.replace("http://www.w3.org", "").replace("http://purl.org", "").replace(
+        "http://creativecommons.org", ""
+    ).replace("https://matplotlib.org", "")
+    for run in found["runs"]:
+        assert run["run"] in text
+    for word in ("v0 fail", "sigma r as published", "SHA-256", "P1 (15)", "2d", "beyond-plate-inertia"):
+        assert word in text
+    with sync_playwright() as p:
+        browser = p.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox", "--disable-gpu"])
+        page = browser.new_page()
+        asked: list[str] = []
+        page.on("request", lambda r: asked.append(r.url))
+        page.goto(out.as_uri())
+        assert page.locator("svg").count() == 1 + len(found["runs"])
+        width = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
+        browser.close()
+    assert width <= 0, "nothing is cut off at the right"
+    assert asked == [out.as_uri()]
+    done = subprocess.run(
+        [DROPTOWER, "report", "none", "--data", series_data, "-o", out], capture_output=True, text=True
+    )
+    assert done.returncode == 1
+    assert "no run of a series 'none'" in done.stderr
