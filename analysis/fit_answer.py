@@ -54,10 +54,10 @@ def permanent(fit: Fit) -> dict[str, float | None] | None:
 
 
 def _impulse(fit: Fit) -> float:
-    """J of the fitted contact, N·s."""
+    """J of the fitted contact as far as the record was seen, N·s."""
     w = fit.problem.window
     t = fit.best.x[T0] + (np.arange(4000) + 0.5) / 4000 * 2 * w.length
-    return float(fit.problem.contact(fit.best.x, t).sum()) * (2 * w.length / 4000)
+    return float(fit.problem.contact(fit.best.x, t)[t <= w.reach].sum()) * (2 * w.length / 4000)
 
 
 def _parameter(name: str, p: Parameter, rows: list[Row]) -> dict[str, Any]:
@@ -135,13 +135,14 @@ def _cautions(fit: Fit, known: dict[str, Parameter]) -> list[Caution]:
 
 
 def curves(fit: Fit, points: int = 1000) -> dict[str, Array]:
-    """For figures: t s from contact (n,), force and model N, ringing N, and what is left N, at the fitted points."""
+    """For figures: t s from contact (n,), force and model N, ringing N, and what is left N, at the fitted points.
+
+    What is left is NaN where a point was left out, the model where none follows that was fitted.
+    """
     w, x = fit.problem.window, fit.best.x
     step = max(1, w.t.size // points)
     t = w.t[::step]
     ringing = fit.problem.ringing(x, t)
-    model = fit.problem.contact(x, t)
-    return {
-        "t": t - x[T0], "force": w.force[::step] - x[LEVEL], "model": model, "ringing": ringing,
-        "left": w.force[::step] - x[LEVEL] - model - ringing,
-    }  # fmt: skip
+    model = np.where(t <= w.reach, fit.problem.contact(x, t), np.nan)
+    left = np.where(w.kept[::step], w.force[::step] - x[LEVEL] - model - ringing, np.nan)
+    return {"t": t - x[T0], "force": w.force[::step] - x[LEVEL], "model": model, "ringing": ringing, "left": left}

@@ -70,7 +70,7 @@ def elements_of(fit: Fit, points: int) -> tuple[dict[str, Array], Array]:
     parts = {"F": F, "alpha": alpha, "alpha_1": alpha_1, "alpha_2": c * J, "alpha_3": alpha - alpha_1 - c * J}
     if problem.kind != "flexed":
         parts["alpha_3"] = np.zeros(t.size)
-    some = np.linspace(0, int(np.flatnonzero(F > 0)[-1]), points).astype(int)
+    some = np.linspace(0, int(np.flatnonzero((F > 0) & (t + x[T0] <= problem.window.reach))[-1]), points).astype(int)
     return {key: values[some] for key, values in parts.items()}, t[some]
 
 

@@ -44,6 +44,11 @@ class Window:
     v0: Speed
     left_out: str | None
 
+    @property
+    def reach(self) -> float:
+        """s on the record's axis: the last point that is valid. What the model says after it has not been seen."""
+        return float(self.t[np.flatnonzero(self.kept)[-1]])
+
 
 def window_of(record: Record, events: Events, v0: Speed) -> Window:
     """The window around the first contact; what the range cuts off and what follows the record's end is left out."""

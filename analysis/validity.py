@@ -64,11 +64,12 @@ class Peak:
 
 
 def peak_of(fit: Fit) -> Peak:
-    """The peak of the fitted contact."""
+    """The peak of the fitted contact, as far as the record was seen."""
     constants = fit.problem.constants(fit.best.x)
     m, g, K, q, beside, v0 = (float(constants[k]) for k in (0, 1, 3, 5, 7, 8))
     t: Array = (np.arange(8000) + 0.5) / 8000 * 2 * fit.problem.window.length
     F = fit.problem.contact(fit.best.x, t + fit.best.x[T0])
+    F[t + fit.best.x[T0] > fit.problem.window.reach] = 0.0
     top = int(np.argmax(F))
     J = float(F.sum() * (t[1] - t[0]))
     length = float(t[np.flatnonzero(F > 0)[-1]])
@@ -109,7 +110,7 @@ def _checks(fit: Fit, peak: Peak) -> Iterator[Check]:
     if d is not None:
         yield Check("thickness-over-contact-radius", d / a, "1", None, "thickness over contact radius")
     depth = peak.J * float(fit.best.x[FLOW])
-    if depth > 0 and kind != "parallel":
+    if depth > 0 and kind != "parallel" and fit.problem.window.whole and peak.v1 > 0:
         work = 0.5 * impact.mass * (fit.problem.window.v0.value**2 - 0.375 * peak.v1**2)
         text = "dynamic hardness (Tabor), energy over the volume π·r·α_perm² of the mark"
         yield Check("dynamic-hardness", work / (math.pi * r * depth**2), "Pa", None, text)
