@@ -3,6 +3,7 @@
 from typing import Any
 
 from analysis.rupture import failure_speed, mean_of, plate_stress
+from analysis.staircase import staircase
 from daq.run import RunData
 
 Drop = tuple[RunData, dict[str, Any]]
@@ -30,6 +31,7 @@ def rupture_of(drops: list[Drop]) -> tuple[dict[str, Any], list[dict[str, str]]]
         "sigma_r": None, "sigma_r_as_published": None, "E_a": None,
         "E_a_prime": _mean([found["E_failure"]["value"] for _, found in lost], "J"),
     }  # fmt: skip
+    answer["staircase"] = _staircase(known)
     limit = failure_speed([v for v, _ in speeds], [failed for _, failed in speeds]) if speeds else None
     if limit is not None:
         answer["v0_fail"] = {"value": limit.value, "unit": "m/s", "lo": limit.lo, "hi": limit.hi}
@@ -44,6 +46,27 @@ def rupture_of(drops: list[Drop]) -> tuple[dict[str, Any], list[dict[str, str]]]
     for key, as_published in (("sigma_r", False), ("sigma_r_as_published", True)):
         answer[key] = _mean([s for run, found in lost if (s := _stress(run, found, as_published)) is not None], "Pa")
     return answer, warnings
+
+
+def _staircase(known: list[tuple[RunData, dict[str, Any], bool]]) -> dict[str, Any] | None:
+    """Mean failure energy by the up-and-down method, where heights of one mass make a ladder; else None."""
+    heights = [run.test.drop.height_mm for run, _, _ in known]
+    masses = {run.test.dart.mass_kg for run, _, _ in known}
+    if len(masses) != 1 or any(h is None for h in heights):
+        return None
+    found = staircase([float(h or 0) for h in heights], [failed for _, _, failed in known])
+    if found is None:
+        return None
+    per_mm = masses.pop() * known[0][0].g * 1e-3
+
+    def joules(height: float | None) -> float | None:
+        return None if height is None else height * per_mm
+
+    return {
+        "E_50": {"value": joules(found.mean), "unit": "J", "u": joules(found.u)},
+        "deviation": {"value": joules(found.deviation), "unit": "J"},
+        "height_mm": found.mean, "next_height_mm": found.following, "step_mm": found.step, "drops": found.drops,
+    }  # fmt: skip
 
 
 def _value(found: dict[str, Any], symbol: str) -> Any:

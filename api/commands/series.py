@@ -104,5 +104,11 @@ def _print(found: dict[str, Any]) -> None:
         console.print(table)
     if found["v0_fail"] is not None or found["F_rupture"] is not None:
         console.print(_rupture(found))
+    steps = found["staircase"]
+    if steps is not None:
+        E = value_with_u(steps["E_50"]["value"], steps["E_50"]["u"])
+        console.print(
+            f"up and down over {steps['drops']} drops: half fail at {E} J; next height {steps['next_height_mm']:g} mm"
+        )
     for warning in found["warnings"]:
         console.print(f"! {warning['code']}: {warning['text']}", highlight=False, markup=False)
