@@ -9,7 +9,7 @@ setup: .venv/installed
 .venv/installed: pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo "droptower needs Python 3.11 or later, this is $$($(PYTHON) --version); name another by: make PYTHON=python3.12" >&2; exit 1; }
-	@echo "setting up .venv (some 400 MB, a minute or two)"
+	@echo "setting up .venv (some 900 MB, a minute or two)"
 	$(PYTHON) -m venv .venv
 	$(INSTALL) --editable .
 	$(BIN)/python -m analysis.fit_problem  # compiles the kernel of the fits, so that no first drop waits for it
