@@ -69,10 +69,8 @@ def evaluate(record: Record, impact: Impact, events: Events, answer: Answer) -> 
 
     Up to the failure α = ∫v dt and E = ∫F·v dt (P1: E_a′ is the area under F–α up to it).
     """
-    if saturated(record, events) is not None:
-        return events
     v0 = speed_at_contact(record, impact, events, Answer())
-    found = None if v0 is None else complete_failure(events, impact, v0)
+    found = None if v0 is None else complete_failure(record, events, impact, v0)
     if found is None or v0 is None or events.start is None:
         return events
     start = _start(events, impact, v0, found)
@@ -112,9 +110,9 @@ def _start(events: Events, impact: Impact, v0: Speed, found: Failure) -> Edge:
     return start if ringing is not None and start is not None else events.start
 
 
-def complete_failure(events: Events, impact: Impact, v0: Speed) -> Failure | None:
-    """The complete failure of a specimen, or None."""
-    if events.start is None or events.end is None:
+def complete_failure(record: Record, events: Events, impact: Impact, v0: Speed) -> Failure | None:
+    """The complete failure of a specimen, or None; a saturated record tells none, its impulse is short as well."""
+    if events.start is None or events.end is None or saturated(record, events) is not None:
         return None
     t, force = events.t, events.force
     inside = (t > events.start.t) & (t < events.end.t)

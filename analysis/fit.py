@@ -1,7 +1,7 @@
 """E and the damper coefficients of one record, with intervals, by least squares on a lumped model.
 
 The start of contact, the zero level, v0 and the ringing of head and plate are fitted with them: left out, each leaks
-into the dampers (NUMERICS, "What the record can tell"). The whole contact is taken, with what lies before and after.
+into the dampers (docs/fits.md). The whole contact is taken, with what lies before and after.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def fit_record(
     kind = kind or ("flexed" if impact.support == "ring" else "series")
     _allowed(impact, kind, corrections)
     window = window_of(record, events, v0)
-    failed = complete_failure(events, impact, v0)
+    failed = complete_failure(record, events, impact, v0)
     if failed is not None:
         window = until(window, failed.t)
     _closes(window, impact)
@@ -101,7 +101,7 @@ def _allowed(impact: Impact, kind: Kind, corrections: tuple[Corrected, ...]) -> 
         wanted |= {"thickness": impact.thickness}
     for name, value in wanted.items():
         if value is None:
-            raise NotFitted(f"no model is fitted: the {kind} model, so corrected, needs {name}")
+            raise NotFitted(f"no model is fitted: the {kind} model needs {name}")
         if name != "nu" and not value > 0:
             raise NotFitted(f"no model is fitted: {name} has to be above 0, it is {value:g}")
     assert impact.nu is not None

@@ -98,7 +98,7 @@ def _compared(fit: Fit) -> dict[str, Any] | None:
     if other is None:
         return None
     try:
-        beside = fit_window(problem.window, problem.impact, other)
+        beside = fit_window(problem.window, problem.impact, other, problem.corrections)
     except NotFitted:
         return None
     bic = {problem.kind: fit.bic, other: beside.bic}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from analysis.conditions import Impact
+from analysis.models import contact_stiffness, plate_stiffness
 
 SOFTEST = 0.5e9
 """Pa: polymers that are hit by a dart are hardly softer."""
@@ -23,10 +24,10 @@ def longest_contact(impact: Impact, E: float = SOFTEST) -> float:
     if v0 is None and impact.height is not None:
         v0 = math.sqrt(2 * impact.g_falling * impact.height)
     v0 = v0 or SLOWEST
-    K_i = 4 / 3 * math.sqrt(impact.tip_radius) * E / (1 - nu**2)
+    K_i = contact_stiffness(impact.tip_radius, E, nu)
     alpha_M = (5 * impact.mass * v0**2 / (4 * K_i)) ** 0.4
     contact = 2.9432 * alpha_M / v0
     if impact.support == "rigid" or impact.thickness is None or impact.support_radius is None:
         return contact
-    K_d = 4 * math.pi / 3 * impact.thickness**3 * E / ((1 - nu) * (3 + nu) * impact.support_radius**2)
+    K_d = plate_stiffness(impact.thickness, impact.support_radius, E, nu)
     return math.hypot(contact, math.pi * math.sqrt(impact.mass / K_d))

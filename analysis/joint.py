@@ -41,10 +41,8 @@ class Joint:
     agree: bool
 
 
-def fit_jointly(fits: Sequence[Fit], law: bool, dampers: bool = True) -> Joint:
-    """Fit drops that were fitted singly.
-
-    law : E follows a power of v0; otherwise one E. dampers : one C_i and C_d (or C); otherwise each drop its own
+def fit_jointly(fits: Sequence[Fit], law: bool) -> Joint:
+    """Fit drops that were fitted singly: one C_i and C_d (or C), and one E, or with ``law`` a power of v0.
 
     Raises
     ------
@@ -57,7 +55,7 @@ def fit_jointly(fits: Sequence[Fit], law: bool, dampers: bool = True) -> Joint:
     if len(kinds) > 1:
         raise NotFitted(f"no joint fit: the drops have different models ({', '.join(sorted(kinds))})")
     free = fits[0].problem.free
-    shared = [LN_E] + [k for k in (FLOW, DAMPER) if dampers and free[k]] + ([SLOPE] if law else [])
+    shared = [LN_E] + [k for k in (FLOW, DAMPER) if free[k]] + ([SLOPE] if law else [])
     speeds = np.array([float(fit.best.x[V0]) for fit in fits])
     v_ref = float(np.exp(np.log(speeds).mean()))
     if law and float(np.ptp(speeds)) < 0.05 * v_ref:
@@ -122,11 +120,11 @@ def _stepped(
     kept: list[tuple[Array, Array, Array]] = []
     for (r, J), own, distance in zip(parts, own_of, away, strict=True):
         S = np.stack([J[LN_E] * distance if at == SLOPE else J[at] for at in shared])
-        O = J[own]  # noqa: E741  its own
-        scale = 1 / np.sqrt(np.maximum((O * O).sum(axis=1), 1e-300))
-        inverse = np.linalg.inv((O * scale[:, None]) @ (O * scale[:, None]).T + 1e-12 * np.eye(len(own)))
-        inverse = inverse * scale * scale[:, None]
-        across, g = O @ S.T, O @ r
+        apart = J[own]
+        scale = 1 / np.sqrt(np.maximum((apart * apart).sum(axis=1), 1e-300))
+        scaled = apart * scale[:, None]
+        inverse = np.linalg.inv(scaled @ scaled.T + 1e-12 * np.eye(len(own))) * scale * scale[:, None]
+        across, g = apart @ S.T, apart @ r
         kept.append((inverse, across, g))
         normal += S @ S.T - across.T @ inverse @ across
         pull += S @ r - across.T @ inverse @ g

@@ -20,6 +20,7 @@ from analysis.fit_intervals import interval
 from analysis.fit_problem import DAMPER, FLOW, LN_E, T0
 from analysis.models import on_layer, overhang
 from analysis.record import Array
+from analysis.rupture import plate_stress
 
 WITHIN, BEYOND, CORRECTED, UNKNOWN, TOLD = "within", "beyond", "corrected", "not known", "told"
 THIN, SMALL_DEFLECTION, MEMBRANE, OVERHANG = 0.2, 0.5, 0.05, 0.02
@@ -135,5 +136,10 @@ def _plate(fit: Fit, peak: Peak, E: float, d: float, R: float, nu: float) -> Ite
         "need not be of the material, and E may read up to 1.5 % low"
     )
     yield Check("plate-inertia", inertia, "kg/s", interval(fit, DAMPER)[1], text)
-    stress = peak.F / d**2 * ((1 + nu) * (0.485 * math.log(R / d) + 0.52) + 0.48)
-    yield Check("strain-rate", stress / (E * peak.t_M), "1/s", None, "of the plate's lower face, σ/(E·t_M)")
+    yield Check(
+        "strain-rate",
+        plate_stress(peak.F, d, R, nu) / (E * peak.t_M),
+        "1/s",
+        None,
+        "of the plate's lower face, σ/(E·t_M)",
+    )

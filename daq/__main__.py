@@ -119,7 +119,9 @@ def main() -> int:
         text = (
             f"an error inside droptower ({type(e).__name__}: {e}); a captured record is still held: `recover` reads it"
         )
-        _emit("failed", outcome="internal", text=text, trace=traceback.format_exc())
+        if _log is not None:
+            _log({"event": "trace", "at": now(), "text": traceback.format_exc()})
+        _emit("failed", outcome="internal", text=text)
         return 1
     _emit("done", run=run)
     return 0

@@ -20,6 +20,8 @@ from analysis.fit_profile import elements_of, profile
 from analysis.joint import fit_jointly
 from analysis.record import Record
 from analysis.validity import validity
+from sim_device.fall import Motion
+from sim_device.settings import Dart, Hang, Rig, Specimen
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "bench"))
 from coverage_fits import Drop, drawn
@@ -206,6 +208,19 @@ def test_overhang_is_corrected_where_asked():
     assert (parameters(fit)["E"].value or 0) / plain == pytest.approx(0.945, abs=0.01)
     assert to_json(fit)[0]["corrections"] == ["overhang"]
     assert next(c for c in validity(fit)[0] if c["check"] == "overhang")["word"] == "corrected"
+
+
+def test_finite_thickness_is_corrected_on_the_emulators_own_layer():
+    specimen = Specimen("rigid", 2.3, 0.32, 5.0, C=8000.0, C_d=0.0, finite=True)
+    motion = Motion(Rig(specimen=specimen, dart=Dart(0.743), drop=Hang(None, 1.5, catcher=True)))
+    t = np.arange(9000) * 1e-6
+    noise = 5 * np.random.default_rng(1).standard_normal(t.size)
+    record = Record(motion.force(t - 1.5e-3) + noise, 1e-6, pretrigger=1500)
+    impact = Impact(0.743, 6.35e-3, 5e-3, 0.32, "rigid", None, v0=1.5, u_v0=0.0075)
+    plain = parameters(fit_record(record, impact))["E"].value or 0
+    right = parameters(fit_record(record, impact, None, ("finite-thickness",)))["E"].value or 0
+    assert plain / 2.3e9 > 1.3
+    assert right == pytest.approx(2.3e9, rel=0.01)
 
 
 def test_corrections_are_refused_where_they_have_no_place():

@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from analysis.contact_solver import solve
+from analysis.fit_problem import kernel
 from analysis.models import Model, contact_stiffness, hunt_crossley, plate_stiffness
 from analysis.predict import elements, predict
 from sim_device import mechanics
@@ -64,6 +65,10 @@ def test_force_agrees_with_scipy_at_tight_tolerance(name: str, v0: float) -> Non
     t = np.linspace(0, 0.999 * solution.end, 300)
     expected = papers_form(model, v0, t)
     assert np.abs(solution.force(t) - expected).max() < 1e-6 * expected.max()
+    q, compiled = model.bending, np.empty(t.size)
+    constants = [model.mass, model.g, 0, model.K_i, model.flow, q, model.C_d * q, model.C, v0, 1, 0, 0, 0, 0]
+    kernel().contact(np.array(constants, dtype=float), t, compiled, np.empty((0, 0)))
+    assert np.abs(compiled - expected).max() < 1e-6 * expected.max()
 
 
 def test_without_gravity_and_dampers_it_is_the_closed_form() -> None:
