@@ -15,12 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "analysis")]
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "analysis"))
 
-import drops  # noqa: E402  the tests' own generator, found by the path above
+import drops
 
-from analysis import analyze  # noqa: E402  after the path, like drops
+from analysis import analyze
 
 SYMBOLS = ("t_contact", "t_c", "eps_exact", "F_M")
 

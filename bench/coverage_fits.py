@@ -18,16 +18,15 @@ from pathlib import Path
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from analysis.conditions import Impact  # noqa: E402  after the path
-from analysis.fit import NotFitted, fit_record  # noqa: E402
-from analysis.fit_intervals import Parameter, parameters  # noqa: E402
-from analysis.record import Record  # noqa: E402
-from sim_device.fall import Motion  # noqa: E402
-from sim_device.sensors import Scale, signal, white  # noqa: E402
-from sim_device.settings import Dart, Hang, Rig, Sensor, Specimen  # noqa: E402
+from analysis.conditions import Impact
+from analysis.fit import NotFitted, fit_record
+from analysis.fit_intervals import Parameter, parameters
+from analysis.record import Record
+from sim_device.fall import Motion
+from sim_device.sensors import Scale, signal, white
+from sim_device.settings import Dart, Hang, Rig, Sensor, Specimen
 
 CASES = ("flexed plate", "indentation", "flexed plate, no C_d")
 U_V0 = 0.005

@@ -16,28 +16,27 @@ from typing import Any
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
-sys.path.insert(0, str(ROOT / "bench"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-import lmfit  # noqa: E402  after the path
-from coverage_fits import drawn  # noqa: E402
-from scipy.integrate import odeint, solve_ivp  # noqa: E402
-from scipy.optimize import least_squares  # noqa: E402
+import lmfit
+from coverage_fits import drawn
+from scipy.integrate import odeint, solve_ivp
+from scipy.optimize import least_squares
 
-from analysis.conditions import Impact  # noqa: E402
-from analysis.events import locate  # noqa: E402
-from analysis.findings import Answer  # noqa: E402
-from analysis.fit import fit_window  # noqa: E402
-from analysis.fit_answer import to_json  # noqa: E402
-from analysis.fit_intervals import parameters  # noqa: E402
-from analysis.fit_problem import DAMPER, FLOW, LN_E, T0, Problem, kernel  # noqa: E402
-from analysis.fit_start import start_of  # noqa: E402
-from analysis.fit_window import POINTS, Window, window_of  # noqa: E402
-from analysis.kinematics import passed  # noqa: E402
-from analysis.levenberg import minimise  # noqa: E402
-from analysis.restitution import speed_at_contact  # noqa: E402
-from analysis.speed import Speed  # noqa: E402
+from analysis.conditions import Impact
+from analysis.events import locate
+from analysis.findings import Answer
+from analysis.fit import fit_window
+from analysis.fit_answer import to_json
+from analysis.fit_intervals import parameters
+from analysis.fit_problem import DAMPER, FLOW, LN_E, T0, Problem, kernel
+from analysis.fit_start import start_of
+from analysis.fit_window import POINTS, Window, window_of
+from analysis.kinematics import passed
+from analysis.levenberg import minimise
+from analysis.restitution import speed_at_contact
+from analysis.speed import Speed
 
 M, R, NU, D, RING, G, V0 = 0.503, 6.35e-3, 0.33, 4.6e-3, 30e-3, 9.80665, 2.0
 TRUE = (3.3e9, 7000.0, 8.0)

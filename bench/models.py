@@ -10,14 +10,15 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import brentq
 
-sys.path[:0] = [str(Path(__file__).resolve().parents[1] / part) for part in ("", "tests", "tests/analysis")]
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "analysis"))
 
-from test_models import CASES, papers_form  # noqa: E402  after the path, like the rest
+from test_models import CASES, papers_form
 
-from analysis.contact_solver import solve  # noqa: E402
-from analysis.fit_problem import kernel  # noqa: E402
-from analysis.models import Model, contact_stiffness, plate_stiffness  # noqa: E402
-from analysis.predict import predict  # noqa: E402
+from analysis.contact_solver import solve
+from analysis.fit_problem import kernel
+from analysis.models import Model, contact_stiffness, plate_stiffness
+from analysis.predict import predict
 
 TIP = 6.35e-3
 ROWS = (
