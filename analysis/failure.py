@@ -1,60 +1,22 @@
-"""Complete failure in one record: the load is lost at once, and the dart goes on into the specimen.
-
-Two things have to come together. The impulse falls short: at the end of contact the dart still moves down, which no
-intact specimen leaves it. And the load falls from most of its value to nothing within some tens of microseconds, which
-neither the contact itself nor the ringing of the head does; a record in the wrong unit has the first, not the second.
-No filter touches the record: time and load come from a fit of the corner itself.
-"""
+"""Whether, when and how the specimen failed, with load, displacement and energy there."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
 
-import numpy as np
-from scipy.special import ndtr
-
 from analysis.checks import saturated
+from analysis.complete import Failure, complete_failure
 from analysis.conditions import Impact
-from analysis.events import Events, edge
+from analysis.events import Events
 from analysis.findings import Answer
-from analysis.kinematics import integrate
-from analysis.onset import Edge
-from analysis.record import Array, Record
+from analysis.first_contact import start_before
+from analysis.kinematics import Kinematics, integrate
+from analysis.partial import Doubt, Partial, partial_failure
+from analysis.puncture import put_puncture
+from analysis.record import Record
 from analysis.restitution import speed_at_contact
-from analysis.ringing import find_ringing
 from analysis.speed import Speed
-
-_LOOK, _BEFORE, _AFTER = 60e-6, 120e-6, 30e-6
-"""s: in which the load has to be lost; looked at before and after the corner."""
-_LOST = 0.6
-"""Of the load at the corner, within `_LOOK`. Ringing of 15 % swings by 0.3 of it at the most."""
-_SURE = 4.0
-"""Standard uncertainties by which the dart has to be moving down when the load is gone."""
-_LEAST = 0.03
-"""Of v0: the same, whatever the uncertainty."""
-_DECAYS = (2e-6, 5e-6, 10e-6, 20e-6)
-"""s, in which the load falls to 1/e."""
-_LAW, _WIDER = 0.5e-6, 1.4
-"""What the law of the corner lacks: s, and by how much it makes the load less sure (`bench/failure.py`)."""
-_LONG = 500e-6
-"""s before the corner from which the load there is told, ringing taken out."""
-_RINGS = np.arange(3e3, 18e3, 500.0)
-"""Hz."""
-
-
-@dataclass(frozen=True)
-class Failure:
-    """t : s on the record's axis, when the load begins to fall; F : N, contact force there; u_t, u_F of them
-    confidence : 0 to 1, that the dart went on
-    """
-
-    t: float
-    u_t: float
-    F: float
-    u_F: float
-    confidence: float
-
 
 NOT_OF_A_FAILED_ONE = (
     "t_c", "J", "eps_published", "eps_exact", "eps_flight", "eps_gate", "v1", "alpha_M", "alpha_r", "E_diss"
@@ -62,154 +24,140 @@ NOT_OF_A_FAILED_ONE = (
 """Findings that a specimen without rebound has not."""
 
 
-def evaluate(record: Record, impact: Impact, events: Events, answer: Answer) -> Events:
-    """Put a complete failure into the answer, with way and energy up to it; nothing where there is none.
+@dataclass(frozen=True)
+class Outcome:
+    """What became of the specimen, as far as force and speed say.
 
-    Returns the events, first contact as the record before the failure has it.
-
-    Up to the failure α = ∫v dt and E = ∫F·v dt (P1: E_a′ is the area under F–α up to it).
+    events : with first contact as what precedes the break has it; v0 : None: not known
+    complete, part : None: not seen
     """
+
+    events: Events
+    v0: Speed | None
+    complete: Failure | None = None
+    part: Partial | Doubt | None = None
+
+    @property
+    def broke(self) -> float | None:
+        """s on the record's axis: from when on the specimen is not what it was; None: it is."""
+        if isinstance(self.part, Partial):
+            return self.part.loss.t
+        return None if self.complete is None else self.complete.t
+
+
+def outcome_of(record: Record, impact: Impact, events: Events) -> Outcome:
+    """What became of the specimen; of a saturated record nothing can be said."""
     v0 = speed_at_contact(record, impact, events, Answer())
-    found = None if v0 is None else complete_failure(record, events, impact, v0)
-    if found is None or v0 is None or events.start is None:
-        return events
-    start = _start(events, impact, v0, found)
-    answer.set("t_contact", start.t, start.u)
-    path = integrate(events.t, events.force, start.t, found.t, impact.mass, v0.value, impact.g)
+    if v0 is None or events.start is None or saturated(record, events) is not None:
+        return Outcome(events, v0)
+    complete = complete_failure(events, impact, v0)
+    part = partial_failure(events, impact, v0.value, None if complete is None else complete.t)
+    found = Outcome(events, v0, complete, part)
+    if found.broke is None:
+        return found
+    events = replace(events, start=start_before(events, impact, v0.value, found.broke))
+    return replace(found, events=events, v0=speed_at_contact(record, impact, events, Answer()))
+
+
+def evaluate(impact: Impact, outcome: Outcome, answer: Answer) -> None:
+    """Say whether the specimen failed, and put what belongs to it into the answer; unknown where it cannot be told."""
+    events, v0, part = outcome.events, outcome.v0, outcome.part
+    if v0 is None or events.start is None:
+        return
+    if outcome.complete is not None:
+        _complete(impact, events, v0, outcome.complete, part, answer)
+        return
+    eps, u = answer.get("eps_exact")
+    if eps is not None and eps < 0:
+        put_puncture(impact, events, v0, answer)
+    if eps is None or not 0 < eps < 1 + 3 * u + 1e-3:
+        return
+    v1, u_v1 = answer.get("v1")
+    rebounds = 0.5 * (1 + math.erf((v1 or 0.0) / max(u_v1, 1e-9) / math.sqrt(2)))
+    answer.say("failed", isinstance(part, Partial) and part.cracked)
+    answer.set("confidence", rebounds)
+    if isinstance(part, Partial):
+        _partial(impact, events, v0, part, answer)
+    elif part is not None:
+        answer.set("confidence", min(rebounds, 0.5))
+        answer.warn(
+            "crack-uncertain",
+            f"{1e3 * (part.loss.t - events.start.t):.3f} ms after contact {part.loss.share:.0%} of the load seems "
+            "lost at once, but the specimen is as stiff after it as before: it rings or shakes, and a crack would "
+            "not show for sure. Look at the specimen.",
+        )
+
+
+def _complete(
+    impact: Impact, events: Events, v0: Speed, found: Failure, part: Partial | Doubt | None, answer: Answer
+) -> None:
+    assert events.start is not None
     answer.forget(NOT_OF_A_FAILED_ONE)
     answer.say("failed", True)
     answer.say("failure_kind", "complete")
-    u_t, since = math.hypot(found.u_t, start.u), found.t - start.t
-    answer.set("t_failure", since, u_t)
-    answer.set("F_failure", found.F, found.u_F)
-    alpha, energy = float(path.alpha[-2]), float(path.energy[-2])
-    answer.set("alpha_failure", alpha, math.hypot(v0.u * since, float(path.v[-2]) * u_t))
-    by_force = found.u_F / max(found.F, 1e-9)
-    answer.set("E_failure", energy, energy * math.hypot(v0.u / v0.value, impact.u_gain, 0.3 * by_force))
+    at = (found.t, found.u_t, found.F, found.u_F)
+    _put(impact, events, v0, at, answer, ("F_failure", "alpha_failure", "E_failure"))
+    t_failure, u_t = found.t - events.start.t, math.hypot(found.u_t, events.start.u)
+    answer.set("t_failure", t_failure, u_t)
     answer.set("confidence", found.confidence)
-    for symbol, value, u in (("F_M", found.F, found.u_F), ("t_M", since, u_t)):
-        answer.set(symbol, value, u)
+    answer.set("F_M", found.F, found.u_F)
+    answer.set("t_M", t_failure, u_t)
     answer.set("l_M", *answer.get("alpha_failure"))
     answer.set("E_M", *answer.get("E_failure"))
+    first = part.loss if isinstance(part, Partial) and part.cracked else found
+    _put(impact, events, v0, (first.t, first.u_t, first.F, first.u_F), answer, ("F_D", "l_D", "E_D"))
+    put_puncture(impact, events, v0, answer, found.t)
     answer.warn(
         "specimen-failed",
-        f"The specimen failed {1e3 * since:.3f} ms after contact at {found.F:.0f} N: the load was "
+        f"The specimen failed {1e3 * t_failure:.3f} ms after contact at {found.F:.0f} N: the load was "
         "lost at once and the dart went on. F_M, t_M, l_M and E_M are those at failure; there is no restitution.",
     )
-    return replace(events, start=start)
 
 
-def _start(events: Events, impact: Impact, v0: Speed, found: Failure) -> Edge:
-    """First contact, once more: the ringing is told from what precedes the failure alone, which rings anew."""
+def _partial(impact: Impact, events: Events, v0: Speed, part: Partial, answer: Answer) -> None:
     assert events.start is not None
-    stop = int(np.searchsorted(events.t, found.t))
-    ringing = find_ringing(events.t[:stop], events.force[:stop], events.start.t, found.t, events.noise)
-    at = int(np.searchsorted(events.t, events.start.t))
-    length = found.t - events.start.t
-    start = edge(replace(events, ringing=ringing), impact, v0.value, at, stop - 1, length, ending=False)
-    return start if ringing is not None and start is not None else events.start
+    loss = part.loss
+    when = f"{1e3 * (loss.t - events.start.t):.3f} ms after contact, at {loss.F:.0f} N,"
+    answer.set("confidence", part.confidence)
+    if not part.cracked:
+        answer.warn(
+            "specimen-slipped",
+            f"{when} {loss.share:.0%} of the load was lost at once, and the specimen was as stiff after it as before: "
+            "it slipped in its support and did not crack. alpha_r and E_diss hold the way it slipped.",
+        )
+        return
+    at = (loss.t, loss.u_t, loss.F, loss.u_F)
+    answer.say("failure_kind", "partial")
+    answer.set("t_failure", loss.t - events.start.t, math.hypot(loss.u_t, events.start.u))
+    answer.set("load_lost", loss.share, loss.u_share)
+    for names in (("F_failure", "alpha_failure", "E_failure"), ("F_D", "l_D", "E_D")):
+        _put(impact, events, v0, at, answer, names)
+    answer.warn(
+        "specimen-cracked",
+        f"{when} the specimen cracked: {loss.share:.0%} of its stiffness was gone from then on. It held, and the dart "
+        "came back; ε, E_diss and alpha_r are of a specimen that cracked.",
+    )
 
 
-def complete_failure(record: Record, events: Events, impact: Impact, v0: Speed) -> Failure | None:
-    """The complete failure of a specimen, or None; a saturated record tells none, its impulse is short as well."""
-    if events.start is None or events.end is None or saturated(record, events) is not None:
-        return None
-    t, force = events.t, events.force
-    inside = (t > events.start.t) & (t < events.end.t)
-    if np.count_nonzero(inside) < 32:
-        return None
-    step = float(t[1] - t[0])
-    J = float(force[inside].sum()) * step
-    down = v0.value + impact.g * (events.end.t - events.start.t) - J / impact.mass
-    u = math.hypot(v0.u, impact.u_gain * J / impact.mass, 0.002 * v0.value)
-    if not down > max(_SURE * u, _LEAST * v0.value):
-        return None
-    corner = _corner(t, force, events)
-    if corner is None:
-        return None
-    t_f, u_t = _refined(t, force, corner, events.noise)
-    F, u_F = _load(t, force, t_f, events)
-    return Failure(t_f, u_t, F, math.hypot(_WIDER * u_F, impact.u_gain * F), float(ndtr(down / max(u, 1e-9))))
+def _put(
+    impact: Impact, events: Events, v0: Speed, at: tuple[float, float, float, float], answer: Answer,
+    names: tuple[str, str, str],
+) -> None:  # fmt: skip
+    """Load, displacement and energy at ``at``: t, u_t (s on the record's axis), F, u_F (N).
 
-
-def _corner(t: Array, force: Array, events: Events) -> int | None:
-    """The sample after which the load is lost most suddenly, if it is lost."""
+    α = ∫v dt and E = ∫F·v dt (P1: E_a′ is the area under F–α up to failure).
+    """
     assert events.start is not None
-    assert events.end is not None
-    step = float(t[1] - t[0])
-    look = max(2, round(_LOOK / step))
-    few = max(1, look // 6)
-    mean = np.convolve(force, np.ones(few) / few, mode="valid")  # mean[i]: of force[i : i + few]
-    first = max(int(np.searchsorted(t, events.start.t)), 0)
-    last = min(int(np.searchsorted(t, events.end.t)) + look, mean.size - look - few)
-    if last - first < look:
-        return None
-    before, after = mean[first : last - few], mean[first + few + look : last + look]
-    n = min(before.size, after.size)
-    fall = before[:n] - after[:n]
-    at = int(np.argmax(fall))
-    if fall[at] < _LOST * before[at] or before[at] < 8 * events.noise:
-        return None
-    # The steepest place within; the corner is where it begins.
-    piece = force[first + at : first + at + 2 * few + look]
-    low = np.flatnonzero(piece < 0.8 * before[at])
-    return first + at + (int(low[0]) if low.size else few)
+    t, u_t, F, u_F = at
+    since, u_since = t - events.start.t, math.hypot(u_t, events.start.u)
+    path = _path(impact, events, v0, t)
+    alpha, energy = float(path.alpha[-2]), float(path.energy[-2])
+    answer.set(names[0], F, u_F)
+    answer.set(names[1], alpha, math.hypot(v0.u * since, float(path.v[-2]) * u_since))
+    by_force = 0.3 * u_F / max(F, 1e-9)
+    answer.set(names[2], energy, energy * math.hypot(v0.u / v0.value, impact.u_gain, by_force))
 
 
-def _refined(t: Array, force: Array, corner: int, noise: float) -> tuple[float, float]:
-    """When the load begins to fall, s, and its standard uncertainty: a parabola up to there, an exponential after."""
-    step = float(t[1] - t[0])
-    low, high = max(0, corner - round(_BEFORE / step)), min(t.size, corner + max(4, round(_AFTER / step)))
-    x, y = t[low:high] - t[corner], force[low:high]
-    grid = np.arange(-12e-6, 8e-6, 0.25e-6) if step <= 5e-6 else np.linspace(-4 * step, 3 * step, 81)
-    table = np.empty((len(_DECAYS), grid.size))
-    for j, decay in enumerate(_DECAYS):
-        for k, at in enumerate(grid):
-            table[j, k] = _left(x - at, y, decay)
-    best = table.min(axis=0)
-    k = int(np.argmin(best))
-    s2 = max(noise**2, float(best[k]) / max(x.size - 5, 1))
-    near = grid[best < best[k] + s2]
-    return float(t[corner] + grid[k]), math.hypot(float(np.ptp(near)) / 2, _LAW, 0.3 * step)
-
-
-def _left(s: Array, y: Array, decay: float) -> float:
-    """Sum of squares that the corner's law leaves: a + b·s + c·s² for s < 0, a·e^(−s/decay) after."""
-    before = np.minimum(s, 0.0)
-    basis = np.column_stack((np.exp(-np.maximum(s, 0.0) / decay), before, before * before))
-    scale = np.sqrt((basis * basis).sum(axis=0))
-    a, *_ = np.linalg.lstsq(basis / scale, y, rcond=None)
-    rest = y - basis / scale @ a
-    return float(rest @ rest)
-
-
-def _load(t: Array, force: Array, t_f: float, events: Events) -> tuple[float, float]:
-    """Contact force at ``t_f``, N, and its standard uncertainty: smooth before it, but for one decaying ringing."""
+def _path(impact: Impact, events: Events, v0: Speed, end: float) -> Kinematics:
     assert events.start is not None
-    step = float(t[1] - t[0])
-    begin = max(events.start.t + 20e-6, t_f - _LONG)
-    some = (t >= begin) & (t < t_f - 0.5 * step)
-    if np.count_nonzero(some) < 12:
-        some = (t >= t_f - 12 * step) & (t < t_f - 0.5 * step)
-        value = float(np.polynomial.polynomial.polyfit(t[some] - t_f, force[some], 1)[0])
-        return value, events.noise
-    x, y = (t[some] - t_f) / (t_f - begin), force[some]
-    degree = 4 if x.size > 60 else 2
-    smooth = np.vander(x, degree + 1, increasing=True)
-    best = (math.inf, 0.0, 0.0)
-    for frequency in _RINGS[(t_f - begin) * _RINGS > 1.5]:
-        phase = 2 * np.pi * frequency * (t[some] - t_f)
-        fading = np.exp(-(t[some] - t_f) / 0.6e-3)
-        basis = np.column_stack((smooth, fading * np.cos(phase), fading * np.sin(phase)))
-        a, *_ = np.linalg.lstsq(basis, y, rcond=None)
-        rest = y - basis @ a
-        chi2 = float(rest @ rest)
-        if chi2 < best[0]:
-            s2 = max(chi2 / max(x.size - basis.shape[1], 1), events.noise**2)
-            best = (chi2, float(a[0]), math.sqrt(s2 * float(np.linalg.pinv(basis.T @ basis)[0, 0])))
-    if not math.isfinite(best[0]):
-        a, *_ = np.linalg.lstsq(smooth, y, rcond=None)
-        rest = y - smooth @ a
-        s2 = max(float(rest @ rest) / max(x.size - degree - 1, 1), events.noise**2)
-        return float(a[0]), math.sqrt(s2 * float(np.linalg.inv(smooth.T @ smooth)[0, 0]))
-    return best[1], best[2]
+    return integrate(events.t, events.force, events.start.t, end, impact.mass, v0.value, impact.g)

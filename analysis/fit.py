@@ -12,15 +12,13 @@ import numpy as np
 
 from analysis.conditions import Impact
 from analysis.events import locate
-from analysis.failure import complete_failure
-from analysis.findings import Answer
+from analysis.failure import outcome_of
 from analysis.fit_problem import MODES, T0, Corrected, Problem
 from analysis.fit_start import ringing_in, start_of
 from analysis.fit_window import Window, until, window_of
 from analysis.levenberg import Optimum, minimise
 from analysis.models import Kind
 from analysis.record import Array, Record
-from analysis.restitution import speed_at_contact
 
 _MODES = 2
 _RISING = 0.9
@@ -72,15 +70,15 @@ def fit_record(
     events = locate(record, impact)
     if events is None or events.start is None:
         raise NotFitted("no model is fitted: the record holds no contact with its beginning")
-    v0 = speed_at_contact(record, impact, events, Answer())
+    outcome = outcome_of(record, impact, events)
+    events, v0 = outcome.events, outcome.v0
     if v0 is None:
         raise NotFitted("no model is fitted: the speed at contact is not known; give v0, a drop height or a gate")
     kind = kind or ("flexed" if impact.support == "ring" else "series")
     _allowed(impact, kind, corrections)
     window = window_of(record, events, v0)
-    failed = complete_failure(record, events, impact, v0)
-    if failed is not None:
-        window = until(window, failed.t)
+    if outcome.broke is not None:
+        window = until(window, outcome.broke)
     _closes(window, impact)
     return fit_window(window, impact, kind, corrections)
 

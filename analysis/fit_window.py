@@ -83,10 +83,10 @@ def window_of(record: Record, events: Events, v0: Speed) -> Window:
     )
 
 
-def until(window: Window, failure: float) -> Window:
-    """The window without what follows a failure (s on the record's axis)."""
-    kept = window.kept & (window.t < failure - 2 * window.step)
-    why = "what follows the failure of the specimen was left out"
+def until(window: Window, broken: float) -> Window:
+    """The window without what follows a failure, a crack or a slip (s on the record's axis)."""
+    kept = window.kept & (window.t < broken - 2 * window.step)
+    why = "what follows the failure of the specimen, its crack or its slip was left out"
     return replace(window, kept=kept, left_out=why if window.left_out is None else f"{window.left_out}, and {why}")
 
 

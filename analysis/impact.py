@@ -29,9 +29,11 @@ def analyze(record: Record, impact: Impact) -> Findings:
         if events is None or checks.reversed_polarity(record):
             checks.no_contact(record, answer)
             return answer.done()
+        outcome = failure.outcome_of(record, impact, events)
+        events = outcome.events
         _events(record, impact, events, answer)
         restitution.evaluate(record, impact, events, answer)
-        events = failure.evaluate(record, impact, events, answer)
+        failure.evaluate(impact, outcome, answer)
         checks.after(record, impact, events, answer)
     return answer.done()
 

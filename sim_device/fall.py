@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim_device.mechanics import Contact, Floats, Law, solve
+from sim_device.law import Floats, Law
+from sim_device.mechanics import Contact, solve
 from sim_device.settings import Rig, SettingError, g
 
 LOWEST_BOUNCE = 10e-6
@@ -102,7 +103,8 @@ class Motion:
         self.second = None if math.isfinite(self.over_at) or math.isfinite(self.rest_from) else self._next_touch()
 
     def _solve(self, t: float, v: float, x: float, alpha2: float, alpha3: float) -> None:
-        contact = solve(self.law, v, x, alpha2, alpha3)
+        law = self.contacts[-1][1].law_after if self.contacts else self.law
+        contact = solve(law, v, x, alpha2, alpha3)
         self.contacts.append((t, contact))
         parted = t + contact.end
         if contact.t_failure is not None:
@@ -186,14 +188,19 @@ class Motion:
         return x
 
     def ringings(self, until: float) -> Iterator[tuple[float, float]]:
-        """Moments (s) that set the sensor ringing before ``until``, each with the force in N it is measured by."""
+        """Moments (s) that set the sensor ringing before ``until``, each with the force in N it is measured by.
+
+        First contact by the force it comes to, a crack and a failure by the force that is lost.
+        """
         self.extend(until)
         for start, contact in self.contacts:
             yield start, contact.F_M
+            if contact.t_crack is not None:
+                yield start + contact.t_crack, contact.law.crack_loss * contact.law.crack_N
             if contact.t_failure is not None:
                 yield start + contact.t_failure, contact.F_M
 
-    def truth(self) -> dict[str, float | bool | None]:
+    def truth(self) -> dict[str, float | bool | str | None]:
         """What really happened, SI, times from first contact; what has no meaning after a failure is null."""
         law, contact = self.law, self.contacts[0][1]
         failed = contact.t_failure is not None
@@ -214,13 +221,18 @@ class Motion:
             "eps_exact": -contact.v_end / self.v0 if intact else None,
             "v1": -contact.v_end if intact else None,
             "alpha_r": contact.x_end if intact else None,
-            "alpha_perm": contact.alpha2_end,
+            "alpha_perm": contact.alpha2_end - (0.0 if contact.t_slip is None else law.slip),
             "E_diss": E,
-            "failed": failed,
+            "failed": failed or contact.t_crack is not None,
+            "failure_kind": "complete" if failed else None if contact.t_crack is None else "partial",
             "t_failure": contact.t_failure,
             "F_failure": contact.F_M if failed else None,
             "v_failure": contact.v_failure,
             "alpha_failure": contact.x_failure,
+            "t_crack": contact.t_crack,
+            "F_crack": None if contact.t_crack is None else law.crack_N,
+            "alpha_crack": contact.x_crack,
+            "t_slip": contact.t_slip,
             "t_second": None if self.catcher else self._second_touch(),
             "t_fall": self.t_fall,
         }

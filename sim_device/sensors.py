@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim_device.fall import Motion
-from sim_device.mechanics import Floats
+from sim_device.law import Floats
 from sim_device.settings import Dart, Rig, Sensor, g
 
 DISPLACEMENT, ACCELEROMETER = 2, 3

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
+
 g = 9.80665
 """m/s², acceleration of gravity."""
 
@@ -35,7 +37,9 @@ class Specimen:
     """The specimen and its support; "ring" is a plate free to bend, "rigid" a half-space (PHYSICS.md, Models).
 
     ``modes`` > 0: the plate has mass, of ``density_kg_m3``, and so many of its modes; ``finite``: the half-space is a
-    layer of ``thickness_mm`` that slides on its base.
+    layer of ``thickness_mm`` that slides on its base. At ``fail_N`` it breaks, at ``crack_N`` a crack takes
+    ``crack_loss`` of its stiffness, at ``slip_N`` it gives way by ``slip_mm`` unharmed. ``scatter_E`` and
+    ``scatter_load`` are the standard deviations of ln E and of the logarithm of those loads from specimen to specimen.
     """
 
     kind: str = field(default="ring", metadata={"choices": ("ring", "rigid")})
@@ -47,6 +51,12 @@ class Specimen:
     C_d: float = number(0, 1e6, 10)
     C: float | None = number(1, 1e12, None, optional=True)
     fail_N: float | None = number(1, 1e7, None, optional=True)
+    crack_N: float | None = number(1, 1e7, None, optional=True)
+    crack_loss: float = number(0.01, 0.95, 0.2)
+    slip_N: float | None = number(1, 1e7, None, optional=True)
+    slip_mm: float = number(0.001, 10, 0.3)
+    scatter_E: float = number(0, 0.5, 0)
+    scatter_load: float = number(0, 0.5, 0)
     modes: int = number(0, 6, 0, whole=True)
     density_kg_m3: float = number(100, 30_000, 1310)
     modal_damping: float = number(0, 0.5, 0.01)
@@ -58,6 +68,14 @@ class Specimen:
             raise SettingError("modes are of a plate on a ring without C_d: set kind = 'ring' and C_d = 0 with them")
         if self.finite and self.kind != "rigid":
             raise SettingError("finite is of a specimen on a rigid support: set kind = 'rigid' with it")
+        if self.modes and self.crack_N is not None:
+            raise SettingError("a plate with modes does not crack in part: set modes = 0 or crack_N = null with it")
+
+    def drawn(self, rng: np.random.Generator) -> Specimen:
+        """One specimen of this kind, with its own E and its own loads."""
+        E, load = (math.exp(s * rng.standard_normal()) for s in (self.scatter_E, self.scatter_load))
+        loads = {k: None if (N := getattr(self, k)) is None else N * load for k in ("fail_N", "crack_N", "slip_N")}
+        return replace(self, E_GPa=self.E_GPa * E, **loads)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from sim_device.fall import Motion
-from sim_device.mechanics import Floats, Law
+from sim_device.law import Floats, Law
 from sim_device.settings import Rig
 
 LASTS = 1e-3

@@ -6,6 +6,7 @@ import asyncio
 import json
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -63,15 +64,16 @@ class Tower:
             raise Refused("the dart is not in its clamp: the last drop is not over")
         self._preparing = True
         try:
-            number, rig = self.drops + 1, self.rig
+            number = self.drops + 1
             rng = np.random.default_rng((self._seed, 3, number))
+            rig = replace(self.rig, specimen=self.rig.specimen.drawn(np.random.default_rng((self._seed, 4, number))))
             motion, edges = await asyncio.to_thread(_play, rig, rng)
             self.drops = number
             drop = Drop(number, rig, motion, float(time.monotonic_ns()), float(rng.random()), self._seed)
             if self.recorder is not None:
                 self.recorder.released(drop)
             self._drop = drop
-            self.last_truth = motion.truth()
+            self.last_truth = motion.truth() | {"E": rig.specimen.E_GPa * 1e9, "fail_N": rig.specimen.fail_N}
             self._log(f"drop {number}: {json.dumps(self.last_truth)}")
             self._schedule(drop, edges)
             return number, self.last_truth

@@ -105,7 +105,7 @@ def test_runge_kutta_of_fourth_order_the_papers_method_gives_the_same() -> None:
 
 @pytest.mark.parametrize("C_d", [0.0, 10.0, 200.0])
 def test_the_emulators_own_solver_gives_the_same(C_d: float) -> None:
-    law = mechanics.Law(m=0.503, friction=0.0, K_i=K_I, K_d=K_D, C_i=6000.0, C_d=C_d, fail_N=math.inf)
+    law = mechanics.Law(m=0.503, friction=0.0, K_i=K_I, K_d=K_D, C_i=6000.0, C_d=C_d)
     contact = mechanics.solve(law, 2.2)
     found = predict(solve(Model("flexed", 0.503, K_I, K_D, 6000, C_d), 2.2), 6.35e-3).values
     for symbol, truth in (

@@ -198,3 +198,46 @@ def test_a_specimen_fails_at_its_load_and_lets_the_dart_through():
 
 def test_a_load_that_is_not_reached_fails_nothing():
     assert motion(fail_N=5000).truth()["F_M"] == pytest.approx(motion().truth()["F_M"], rel=1e-9)
+
+
+def test_a_crack_takes_its_share_of_the_energy_that_a_spring_would_give_back(monkeypatch):
+    monkeypatch.setattr(mechanics, "g", 0.0)
+    law = replace(CONSERVATIVE, crack_N=800.0, crack_loss=0.25)
+    contact = solve(law, 1.7)
+    K, at = law.K_i, contact.x_crack
+    assert at == pytest.approx((800 / K) ** (2 / 3), rel=1e-6)
+    energy = 0.5 * law.m * 1.7**2
+    # ½·m·v0² = ∫F dα, along K up to the crack and 0.75·K after it; the 10 µs it takes cost a little more.
+    deepest = ((2.5 * energy / K - at**2.5) / 0.75 + at**2.5) ** 0.4
+    assert contact.x_max == pytest.approx(deepest, rel=0.003)
+    returned = 0.4 * 0.75 * K * contact.x_max**2.5
+    assert contact.v_end == pytest.approx(-math.sqrt(2 * returned / law.m), rel=1e-5)
+    assert contact.force(np.array([contact.t_crack + 100e-6]))[0] == pytest.approx(
+        0.75 * K * contact.position(np.array([contact.t_crack + 100e-6]))[0] ** 1.5, rel=1e-4
+    )
+
+
+def test_a_specimen_that_slips_is_whole_after_it(monkeypatch):
+    monkeypatch.setattr(mechanics, "g", 0.0)
+    law = replace(CONSERVATIVE, slip_N=800.0, slip=50e-6)
+    contact = solve(law, 1.7)
+    later = np.array([contact.t_slip + 400e-6])
+    assert contact.force(later)[0] == pytest.approx(law.K_i * (contact.position(later)[0] - 50e-6) ** 1.5, rel=1e-4)
+    assert contact.x_end == pytest.approx(50e-6, rel=1e-4)
+
+
+def test_what_has_cracked_is_softer_when_it_is_hit_again():
+    hit_twice = motion(2.2, crack_N=600.0, crack_loss=0.3, C_d=0)
+    hit_twice.extend(0.5)
+    first, second = (contact for _, contact in hit_twice.contacts[:2])
+    assert second.law.K_d == pytest.approx(0.7 * first.law.K_d)
+    assert second.t_crack is None
+    assert hit_twice.truth()["failure_kind"] == "partial"
+
+
+def test_specimens_scatter_as_asked():
+    rng = np.random.default_rng(7)
+    made = [Specimen(E_GPa=3.0, fail_N=1800.0, scatter_E=0.03, scatter_load=0.06).drawn(rng) for _ in range(2000)]
+    assert np.std(np.log([s.E_GPa for s in made])) == pytest.approx(0.03, rel=0.06)
+    assert np.std(np.log([s.fail_N for s in made])) == pytest.approx(0.06, rel=0.06)
+    assert np.median([s.fail_N for s in made]) == pytest.approx(1800, rel=0.01)
