@@ -17,14 +17,17 @@ ON_THE_RECORDS_AXIS = ("t_contact", "t_second")
 
 
 def answer_of(store: Store, run: str) -> dict[str, Any]:
-    """The newest answer if this version made it from the raw file as it is now; otherwise a new one, stored.
+    """The newest answer if this version made it from the raw file and test as they are; otherwise a new one, stored.
 
     Raises
     ------
     RunNotFound : no such run.
     StoreError : its file is damaged.
     """
-    made_by = {"droptower": version("droptower"), "raw_sha256": store.sha256(run)}
+    made_by = {
+        "droptower": version("droptower"), "raw_sha256": store.sha256(run),
+        "corrections": [path.name for path in store.corrections(run)],
+    }  # fmt: skip
     kept = store.analysis(run)
     if kept is not None and {k: kept.get(k) for k in made_by} == made_by:
         return kept
@@ -66,6 +69,8 @@ def analysed(
         )
         found["warnings"].insert(0, {"code": "partial-record", "text": text})
     found["warnings"] += run.provenance.get("told", [])
+    seen = run.test.measured.failure_type
+    found["findings"]["failure_type_operator"] = {"value": seen, "unit": "1", "u": None}
     settings = {"g": run.g, "g_source": run.g_source}
     return {
         "run": run.run, "series": run.series, "findings": found["findings"], "fit": by_model,

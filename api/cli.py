@@ -24,6 +24,7 @@ app.command("model")(model.model)
 app.command("series")(series.series)
 app.command("report")(series.report)
 app.command("export")(drops.export)
+app.command("correct")(drops.correct)
 app.command("verify")(drops.verify)
 app.command("serve")(service.serve)
 

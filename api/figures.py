@@ -47,8 +47,8 @@ def save_model(solution: Solution, path: Path) -> None:
     apart.set(xlabel="Time from contact (ms)", ylabel="Displacement (mm)")
     apart.legend(frameon=False)
     for axes in (time, loop, apart):
-        _plain(axes)
-    _save(figure, path)
+        plain(axes)
+    save(figure, path)
 
 
 def save_fit(fit: Fit, path: Path | BinaryIO) -> None:
@@ -90,20 +90,24 @@ def save_fit(fit: Fit, path: Path | BinaryIO) -> None:
         each.axhline(CUT, **STYLES[3])
         each.set(xlabel=f"{name} ({unit})", ylabel="Rise of χ²", ylim=(0, 9))
     for each in (time, loop, left, apart, *axes):
-        _plain(each)
-    if isinstance(path, Path):
-        _save(figure, path)
-    else:
-        figure.savefig(path, format="svg")
+        plain(each)
+    save(figure, path)
 
 
-def _plain(axes: Any) -> None:
+def plain(axes: Any) -> None:
+    """Axes without a frame, with a faint grid."""
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(color="0.9", linewidth=0.6)
 
 
-def _save(figure: Any, path: Path) -> None:
+def save(figure: Any, to: Path | BinaryIO, form: str = "svg") -> None:
+    """Write a figure; a path's suffix says what as, an open file takes ``form``.
+
+    Raises
+    ------
+    StoreError : the file cannot be written.
+    """
     try:
-        figure.savefig(path, dpi=160)
+        figure.savefig(to, dpi=160, format=to.suffix[1:] if isinstance(to, Path) else form)
     except OSError as e:
-        raise StoreError(f"{path} cannot be written: {e.strerror or e}") from None
+        raise StoreError(f"{to} cannot be written: {e.strerror or e}") from None

@@ -1,82 +1,117 @@
-"""A series as one self-contained file to send to a colleague."""
+"""A series as one self-contained file to send to a colleague: HTML that opens without a network, or PDF."""
 
-import io
-from datetime import UTC, datetime
-from importlib.metadata import version
+import re
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from jinja2 import Environment, PackageLoader, select_autoescape
 from markupsafe import Markup
 
-from api.answer import answer_of
-from api.http import present
-from api.http.runs import tree_of
-from api.http.symbols import GROUPS
-from api.series import series_of
+from api.report_blocks import blocks_of
+from api.report_parts import Block, Cell, Heading, Picture, Table, Text
+from api.series import drops_of, series_of
 from daq.errors import StoreError
 from daq.store import Store
 
-TOLD = ("v0", "F_M", "t_c", "alpha_M", "eps_exact", "E_diss")
-OF_FAILED = ("v0", "F_failure", "t_failure", "alpha_failure", "E_failure")
-"""Findings in the table of runs, and in that of those that failed."""
-FITTED = ("E", "C_i", "C_d", "C")
-METHOD = (
-    ("α(t), E(t)", "α = v0·t + ½·g·t² − (1/m)∬F dt², E = ∫F·v dt", "P1 (2), (4); P2 (2)"),
-    ("ε", "J/(m·v0) − 1 − g·t_c/v0", "P1 (7) with the weight's impulse"),
-    ("E, C_i, C_d", "F = K_i·α₁^(3/2) = C_i·α̇₂ = K_d·α₃ + C_d·α̇₃, least squares with nuisances", "P1 (8)–(16)"),
-    ("C", "F = K_i·α₁^(3/2) = C·α̇₂", "P2 (13), (14)"),
-    ("σ_r", "F/d²·[(1 + ν)(0.485·ln(R/d) + 0.52) + 0.48]; as published: log₁₀", "P1 (15)"),
-    ("v0_fail", "half of the specimens fail; likelihood of the drops with a prior on scatter, 95 % interval", ""),
-    ("E_a, E_a′", "½·m·v0_fail²; mean of ∫F dα up to failure", "P1 (17)"),
-)  # fmt: skip
+FORMATS = (".html", ".pdf")
+TYPST_HEAD = """#set page(paper: "a4", margin: (x: 16mm, top: 16mm, bottom: 18mm), numbering: "1 / 1")
+#set text(size: 8.5pt, hyphenate: false)
+#set par(leading: 0.55em)
+#show table: set text(size: 7.4pt)
+#set table(stroke: (x, y) => (bottom: 0.4pt + luma(80%)), inset: (x: 4pt, y: 3pt))
+#show heading.where(level: 1): set text(size: 17pt)
+#show heading.where(level: 2): set text(size: 12pt)
+#show heading: set block(above: 1.3em, below: 0.7em)
+#show heading: set block(sticky: true)
+"""
 
 
-def write_report(store: Store, name: str, path: Path) -> None:
-    """Write the report of a series as HTML that opens without a network.
+def write_report(store: Store, name: str, path: Path, progress: Callable[[int, int], None] | None = None) -> None:
+    """Write the report of a series; the suffix says what as, `progress` is told of drops done and how many there are.
 
     Raises
     ------
-    StoreError : no run is in the series, or the file cannot be written.
+    SeriesNotFound : no run is in the series. StoreError : the file cannot be written.
     """
-    from api.figure_series import save_series
-    from api.figures import save_fit
-    from api.fitting import fit_of
-
-    series = series_of(store, name)
-    drawn = io.BytesIO()
-    save_series(series, drawn)
-    runs: list[dict[str, Any]] = []
-    for row in sorted(series["runs"], key=lambda r: (r["v0"]["value"] is None, r["v0"]["value"])):
-        run, answer = store.read(row["run"]), answer_of(store, row["run"])
-        figure = None
-        if answer["fit"] is not None:
-            figure = io.BytesIO()
-            save_fit(fit_of(run), figure)
-        runs.append(
-            {
-                "run": run, "answer": answer, "conditions": tree_of(run.test), "sha256": store.sha256(run.run),
-                "figure": None if figure is None else _svg(figure),
-                "cells": [present.shown(s, answer["findings"][s]) for s in TOLD],
-                "of_failure": [present.shown(s, answer["findings"][s]) for s in OF_FAILED],
-            }
-        )  # fmt: skip
-    environment = Environment(
-        loader=PackageLoader("api"), autoescape=select_autoescape(), trim_blocks=True, lstrip_blocks=True
+    drops = drops_of(store, name)
+    blocks = blocks_of(
+        store, drops, series_of(name, drops), lambda done: progress(done, len(drops)) if progress else None
     )
-    symbols = {key: symbol for group in GROUPS.values() for key, symbol in group.items()}
-    text = environment.get_template("report.html").render(
-        series=series, runs=runs, figure=_svg(drawn), told=[symbols[s] for s in TOLD],
-        of_failed=[symbols[s] for s in OF_FAILED], fitted=FITTED, method=METHOD,
-        present=present, made=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC", version=version("droptower"),
-    )  # fmt: skip
+    content = _pdf(blocks) if path.suffix == ".pdf" else _html(blocks, name)
     try:
-        path.write_text(text, encoding="utf-8")
+        path.write_bytes(content)
     except OSError as e:
         raise StoreError(f"{path} cannot be written: {e.strerror or e}") from None
 
 
-def _svg(drawn: io.BytesIO) -> Markup:
+def _html(blocks: list[Block], name: str) -> bytes:
+    environment = Environment(
+        loader=PackageLoader("api"), autoescape=select_autoescape(), trim_blocks=True, lstrip_blocks=True
+    )
+    rows = [(type(block).__name__, block) for block in blocks]
+    template = environment.get_template("report.html")
+    return template.render(blocks=rows, name=name, svg=_bare_svg).encode()
+
+
+def _bare_svg(text: str) -> Markup:
     """A figure as it stands in a page: without its XML head."""
-    text = drawn.getvalue().decode("utf-8")
     return Markup(text[text.index("<svg") :])
+
+
+def _pdf(blocks: list[Block]) -> bytes:
+    import typst  # a typesetter, not loaded for HTML
+
+    files: dict[str, str | bytes] = {}
+    parts = [TYPST_HEAD]
+    for block in blocks:
+        match block:
+            case Heading(text, level, page):
+                parts += ["#pagebreak(weak: true)"] if page else []
+                parts.append(f"{'=' * level} {typeset(text)}")
+            case Text(text, None):
+                parts.append(f"#text(fill: luma(35%))[{typeset(text)}]\n")
+            case Text(text, code):
+                box = "width: 100%, fill: luma(94%), inset: 5pt, stroke: (left: 2pt + luma(40%))"
+                parts.append(f"#block({box})[*{typeset(code or '')}* {typeset(text)}]")
+            case Table():
+                parts.append(_table(block))
+            case Picture(svg, caption):
+                files[f"{len(files)}.svg"] = svg.encode()
+                image = f'image("{len(files) - 1}.svg", width: 100%)'
+                parts.append(f"#block(breakable: false)[#{image} #text(size: 7.5pt)[{typeset(caption)}]]")
+    files["main.typ"] = "\n\n".join(parts).encode()
+    made: bytes = typst.compile(cast("Any", files), format="pdf")
+    return made
+
+
+def _table(table: Table) -> str:
+    width = len(table.head or table.rows[0]) if table.head or table.rows else 0
+    if width == 0:
+        return ""
+    sides = ", ".join("left" if k in table.words else "right" for k in range(width))
+    cells = [
+        f"[{typeset(c)}]" if k in table.words else f"[#box[{typeset(c)}]]"
+        for row in table.rows
+        for k, c in enumerate(row)
+    ]
+    head = f"table.header({', '.join(f'[*{typeset(c)}*]' if c else '[]' for c in table.head)}), " if table.head else ""
+    columns = ", ".join("auto" for _ in range(width))
+    return f"#table(columns: ({columns},), align: ({sides},), {head}{', '.join(cells)})"
+
+
+def typeset(text: Cell) -> str:
+    """A cell as Typst markup: what it would take for markup is escaped, subscripts are kept."""
+    plain = str(text) if isinstance(text, Markup) else str(Markup.escape(text))
+    out: list[str] = []
+    for piece in re.split(r"(</?su[bp]>)", plain):
+        tag = re.fullmatch(r"<(/?)(su[bp])>", piece)
+        if tag is not None:
+            out.append("]" if tag[1] else f"#{tag[2]}[")
+        else:
+            # A hash of 64 digits may break anywhere, else it would leave the page.
+            words = re.sub(
+                r"\b[0-9a-f]{64}\b", lambda m: "\u200b".join(re.findall(".{8}", m[0])), Markup(piece).unescape()
+            )
+            out.append(re.sub(r"([\\#$*_`<>@\[\]~=/\-+'\"])", r"\\\1", words))
+    return "".join(out)

@@ -66,6 +66,11 @@ class Catalog:
         with closing(self._connect()) as db:
             return [Row(*r) for r in db.execute(sql, [*values, limit])]
 
+    def forget(self, run: str) -> None:
+        """Read a run anew at the next look: it was corrected."""
+        with closing(self._connect(sync=False)) as db, db:
+            db.execute("DELETE FROM runs WHERE run = ?", (run,))
+
     def rebuild(self) -> int:
         """Throw the cache away and read every run file; the number of runs."""
         with closing(self._connect(sync=False)) as db:

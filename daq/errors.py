@@ -34,6 +34,10 @@ class RunNotFound(StoreError):
     """No run of that id in the data folder."""
 
 
+class SeriesNotFound(DaqError):
+    """No run is in a series of that name."""
+
+
 class LinkError(DaqError):
     """The wire failed."""
 

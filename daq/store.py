@@ -11,10 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from daq import run_file
+from daq.corrections import corrected, correction_text
 from daq.errors import RunNotFound, StoreError
 from daq.run import RUN_ID, RunData
+from daq.test_file import override
 
-_ANALYSIS = re.compile(r"analysis-\d{4}\.json")
+_BESIDE = re.compile(r"(analysis|test)-(\d{4})\.(json|toml)")
 
 
 @dataclass(frozen=True)
@@ -112,23 +114,38 @@ class Store:
         ------
         StoreError : the folder cannot be written.
         """
-        numbered = self._analyses(run)
+        numbered = self._beside(run, "analysis")
         if numbered and json.loads(numbered[-1].read_text()) == answer:
             return numbered[-1]
-        number = int(numbered[-1].stem.removeprefix("analysis-")) + 1 if numbered else 1
+        return self._add(run, "analysis", "json", json.dumps(answer, indent=1).encode() + b"\n")
+
+    def correct(self, run: str, values: dict[str, Any], author: str, reason: str) -> Path:
+        """Put a correction of the test file beside a run; `values` by dotted key.
+
+        Raises
+        ------
+        RunNotFound : no such run. SettingsError : a value is not allowed. StoreError : the folder cannot be written.
+        """
+        override(self.read(run).test, values, "the correction")
+        return self._add(run, "test", "toml", correction_text(run, values, author, reason).encode())
+
+    def _add(self, run: str, kind: str, suffix: str, content: bytes) -> Path:
+        """Write the next numbered file beside a run, once. The test file in raw.h5 counts as the first of its kind."""
+        numbered = self._beside(run, kind)
+        number = int(numbered[-1].stem.rpartition("-")[2]) + 1 if numbered else 2 if kind == "test" else 1
         folder = self.runs_folder / run
         while True:
-            path = folder / f"analysis-{number:04d}.json"
+            path = folder / f"{kind}-{number:04d}.{suffix}"
             part = folder / f".part-{path.name}-{os.getpid()}"
             try:
-                _write(part, json.dumps(answer, indent=1).encode() + b"\n")
+                _write(part, content)
                 os.link(part, path)  # fails where another process has just taken the number
                 _sync_folder(folder)
                 return path
             except FileExistsError:
                 number += 1
             except OSError as e:
-                raise StoreError(f"the answer could not be written to {folder}: {e.strerror or e}") from None
+                raise StoreError(f"{path.name} could not be written to {folder}: {e.strerror or e}") from None
             finally:
                 part.unlink(missing_ok=True)
 
@@ -156,7 +173,18 @@ class Store:
         return path
 
     def read(self, run: str) -> RunData:
-        return run_file.read(self.raw(run))
+        """A run with its corrections.
+
+        Raises
+        ------
+        RunNotFound : no such run. StoreError : its file, or a correction, is damaged.
+        """
+        found = run_file.read(self.raw(run))
+        return corrected(found, [(p.name, p.read_text(encoding="utf-8")) for p in self.corrections(run)])
+
+    def corrections(self, run: str) -> list[Path]:
+        """Corrections of a run's test file, in order."""
+        return self._beside(run, "test")
 
     def sha256(self, run: str) -> str:
         """SHA-256 of the raw file as it is now."""
@@ -166,11 +194,13 @@ class Store:
     def analysis(self, run: str) -> dict[str, Any] | None:
         """The newest answer, or None if the run was never analysed."""
         self.raw(run)
-        numbered = self._analyses(run)
+        numbered = self._beside(run, "analysis")
         return json.loads(numbered[-1].read_text()) if numbered else None
 
-    def _analyses(self, run: str) -> list[Path]:
-        return sorted(p for p in (self.runs_folder / run).glob("analysis-*.json") if _ANALYSIS.fullmatch(p.name))
+    def _beside(self, run: str, kind: str) -> list[Path]:
+        """Numbered files of a kind beside a run, in order."""
+        every = (self.runs_folder / run).glob(f"{kind}-*")
+        return sorted(p for p in every if _BESIDE.fullmatch(p.name))
 
     def verify(self) -> Iterator[Check]:
         """Check every run: raw file against its SHA-256 and the samples' CRC-32, answers against the raw file."""
@@ -186,7 +216,7 @@ class Store:
                 faults.append(f"raw.h5 has SHA-256 {digest}, raw.sha256 states {stated}")
             if (inside := self.read(run).run) != run:
                 faults.append(f"raw.h5 says it is run {inside}")
-            for path in self._analyses(run):
+            for path in self._beside(run, "analysis"):
                 if json.loads(path.read_text()).get("raw_sha256") != digest:
                     faults.append(f"{path.name} was made from another raw.h5")
         except (StoreError, OSError, IndexError, ValueError) as e:

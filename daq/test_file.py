@@ -109,8 +109,12 @@ class Operator(Table):
 
 
 class Measured(Table):
+    """What is seen on the specimen after the test; `failed` and `failure_type` (ISO 6603-2) overrule the record's."""
+
     imprint_diameter_mm: NotNegative | None = None
     imprint_depth_um: NotNegative | None = None
+    failed: bool | None = None
+    failure_type: Literal["YD", "YS", "YU", "NY"] | None = None
 
 
 class ImportChannel(Table):

@@ -142,6 +142,33 @@ def export(
     tell(f"{run} written to {output}")
 
 
+def correct(
+    run: Annotated[str, typer.Argument(help="The run.", metavar="RUN")],
+    data: Data,
+    to: Annotated[
+        list[str],
+        typer.Option("--set", help="A key of the test file and its value: measured.failed=true.", metavar="KEY=VALUE"),
+    ],
+    author: Annotated[str, typer.Option(help="Who corrects.")],
+    reason: Annotated[str, typer.Option(help="Why.")],
+) -> None:
+    """Correct the test file of a run, with author and reason: conditions, or what is seen on the specimen."""
+    from daq.catalog import Catalog
+    from daq.corrections import value_of
+    from daq.store import Store
+
+    values: dict[str, Any] = {}
+    for pair in to:
+        key, sign, value = pair.partition("=")
+        if not sign or "." not in key:
+            raise typer.BadParameter(f"{pair!r} is not TABLE.KEY=VALUE, as measured.failed=true", param_hint="--set")
+        values[key.strip()] = value_of(value.strip())
+    store = Store(data)
+    path = store.correct(run, values, author, reason)
+    Catalog(store).forget(run)
+    tell(f"{run}: {path.name} written; the record is as it was")
+
+
 def verify(data: Data, as_json: Json = False) -> None:
     """Check every run: raw files against their checksums, answers against the raw files."""
     from daq.store import Store

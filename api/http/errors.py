@@ -19,12 +19,14 @@ from daq.errors import (
     LinkError,
     RigBusy,
     RunNotFound,
+    SeriesNotFound,
     SettingsError,
     StoreError,
 )
 
 STATUS: dict[type[DaqError], int] = {
     RunNotFound: 404,
+    SeriesNotFound: 404,
     SettingsError: 422,
     ImportFileError: 422,
     StoreError: 503,

@@ -1,7 +1,7 @@
 """Where things are: every path that an answer or a page names."""
 
 from typing import Any
-from urllib.parse import urlencode
+from urllib.parse import quote, urlencode
 
 API = "/api/v1"
 
@@ -26,6 +26,15 @@ def of_run(run: str) -> dict[str, str]:
         "h5": f"{own}/export?format=h5",
         "page": f"/runs/{run}",
     }
+
+
+def of_series(name: str) -> dict[str, str]:
+    """All that there is of one series."""
+    own = f"{API}/series/{quote(name, safe='')}"
+    return {
+        "self": own, "table": f"{own}/table", "figures": f"{own}/figures", "report": f"{own}/report",
+        "page": f"/series/{quote(name, safe='')}",
+    }  # fmt: skip
 
 
 CURRENT = f"{API}/acquisitions/current"

@@ -9,12 +9,13 @@ from fastapi.responses import Response
 
 from api.answer import answer_of
 from api.http import present
-from api.http.links import API, of_run
+from api.http.links import API, of_run, of_series
 from api.http.queries import cursor
 from api.http.rendering import page
 from api.http.runs import tree_of
 from api.http.shared import Service, Shared
 from api.http.symbols import GROUPS
+from api.series import drops_of, series_of
 from daq.catalog import Row
 from daq.errors import DaqError, StoreError
 
@@ -75,6 +76,7 @@ def bench(request: Request, shared: Shared, series: Text = "", specimen: Text = 
         last=_last_test(shared, every),
         key_figures=KEY_FIGURES,
         present=present,
+        series_page=_series_page,
     )
 
 
@@ -98,6 +100,20 @@ def one_run(request: Request, shared: Shared, run: str) -> Response:
         stated=stated.read_text().partition(" ")[0] if stated.is_file() else None,
         present=present,
     )
+
+
+@router.get("/series/{name}")
+def one_series(request: Request, shared: Shared, name: str) -> Response:
+    """What the drops of a series say together."""
+    from api.figure_series import FIGURES  # loads what draws
+    from api.report_blocks import overview
+
+    drops = drops_of(shared.store, name)
+    parts = [[(type(b).__name__, b) for b in blocks] for blocks in overview(drops, series_of(name, drops))]
+    figures = {figure: title for figure, (title, _) in FIGURES.items()}
+    return page(
+        request, "series.html", name=name, first=parts[0], rest=parts[1], figures=figures, links=of_series(name)
+    )  # fmt: skip
 
 
 @router.get("/definitions")
@@ -136,3 +152,7 @@ def _last_test(shared: Service, rows: list[Row]) -> dict[str, str | None]:
             except DaqError:
                 continue
     return {"series": None, "test_text": SKELETON}
+
+
+def _series_page(name: str) -> str:
+    return of_series(name)["page"]

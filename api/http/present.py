@@ -11,6 +11,7 @@ from api.http.symbols import GROUPS, SYMBOLS, Symbol
 
 UNITS = {"m": ("mm", 1e3), "s": ("ms", 1e3), "N*s": ("N·s", 1.0), "Pa": ("GPa", 1e-9), "1": ("", 1.0)}
 """The bench's unit for one of the contract, and how many of it there are in one."""
+STRESSES = ("sigma_r", "sigma_r_as_published")
 OTHER = "Further"
 
 
@@ -28,7 +29,7 @@ class Shown:
 def shown(key: str, finding: dict[str, Any]) -> Shown:
     """A finding of an answer as it is shown."""
     symbol = SYMBOLS.get(key) or Symbol(escape(key), "", "")
-    unit, factor = UNITS.get(finding["unit"], (finding["unit"], 1.0))
+    unit, factor = ("MPa", 1e-6) if key in STRESSES else UNITS.get(finding["unit"], (finding["unit"], 1.0))
     value, u = in_digits(finding["value"], finding["u"], factor)
     return Shown(key, symbol, value, u, unit)
 

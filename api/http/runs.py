@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from fastapi import APIRouter, Depends, Query, Request
 from fastapi.responses import FileResponse, JSONResponse, Response
+from pydantic import BaseModel, ConfigDict, Field
 from starlette.background import BackgroundTask
 
 from api.answer import analysed, answer_of
@@ -96,6 +97,23 @@ def _flat(table: dict[str, Any]) -> dict[str, Any]:
             flat[key] = [_flat(row) for row in value] if key == "channel" else value
             flat |= {f"u_{key}": u[key]} if key in u else {}
     return flat
+
+
+class Correction(BaseModel):
+    """Keys of the test file with their new values (`measured.failure_type`), who says so, and why."""
+
+    model_config = ConfigDict(extra="forbid")
+    set: Annotated[dict[str, bool | float | str | list[float]], Field(min_length=1, max_length=100)]
+    author: Annotated[str, Field(min_length=1, max_length=200)]
+    reason: Annotated[str, Field(min_length=1, max_length=2000)]
+
+
+@router.post("/runs/{run}/corrections", status_code=201)
+def add_correction(shared: Shared, run: str, correction: Correction) -> Response:
+    """Correct the test file of a run; the record stays as it is, and the correction stands beside it."""
+    path = shared.store.correct(run, dict(correction.set), correction.author, correction.reason)
+    shared.catalog.forget(run)
+    return JSONResponse({"correction": path.name, "links": links.of_run(run)}, 201)
 
 
 @router.get("/runs/{run}/fit")

@@ -14,7 +14,7 @@ from starlette.middleware.body_limit import RequestBodyLimitMiddleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 
 from api.fitting import warm
-from api.http import acquisitions, errors, login, pages, runs, samples
+from api.http import acquisitions, errors, login, pages, runs, samples, series
 from api.http.assets import Assets
 from api.http.bench import Bench
 from api.http.guard import MOST_BYTES, Guard, Outermost, Token
@@ -66,7 +66,7 @@ def create_app(
     app.state.token = key
     errors.install(app)
     api = APIRouter(prefix=API, responses={"default": {"model": errors.ErrorBody}})
-    for part in (runs, samples, acquisitions):
+    for part in (runs, samples, series, acquisitions):
         api.include_router(part.router)
     app.include_router(api)
     app.include_router(pages.router)

@@ -55,6 +55,9 @@ GROUPS: dict[str, dict[str, Symbol]] = {
                      "sharper than the ringing."),
         "failure_kind": _s("kind", "kind of failure", "What the record shows of the failure."),
         "failure_type": _s("type", "type of failure", "ISO 6603-2: yielding or splintering, and how."),
+        "failure_type_operator": _s("type, seen", "type of failure as the operator saw it", "ISO 6603-2, from the test "
+                                    "file; the record's proposal stands beside it."),
+        "load_lost": _s("lost", "share of the stiffness that a crack took", "From then on, of what it was before."),
         "confidence": _s("confidence", "confidence in the verdict", "0 to 1: how clearly the record tells."),
         "t_failure": _s("t<sub>fail</sub>", "time of failure", "From first contact."),
         "F_failure": _s("F<sub>fail</sub>", "force at failure", "Contact force just before the load falls."),

@@ -43,7 +43,14 @@ class Traces:
         RunNotFound, StoreError : as `Store.read`.
         """
         stat = self._store.raw(run).stat()
-        key = (run, stat.st_ino, stat.st_size, stat.st_mtime_ns)  # a file that was put back from elsewhere is another
+        corrections = len(self._store.corrections(run))
+        key = (
+            run,
+            corrections,
+            stat.st_ino,
+            stat.st_size,
+            stat.st_mtime_ns,
+        )  # a file that was put back from elsewhere is another
         with self._lock:
             if (held := self._held.get(key)) is not None:
                 self._held.move_to_end(key)
