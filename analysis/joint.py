@@ -19,6 +19,8 @@ from analysis.fit_problem import DAMPER, FLOW, LN_E, V0
 from analysis.record import Array
 
 _MOST, _DONE = 30, 1e-4
+_LONGEST, _FAR = 0.2, 3.0
+"""Of ln E: a step at the most, and how far from where it began it makes no sense."""
 _UNLIKE = 0.05
 """Probability below which the drops are said to disagree."""
 SLOPE = -1
@@ -41,6 +43,7 @@ class Joint:
     agree: bool
 
 
+@np.errstate(over="ignore", invalid="ignore")  # what runs away is told by `NotFitted`
 def fit_jointly(fits: Sequence[Fit], law: bool) -> Joint:
     """Fit drops that were fitted singly: one C_i and C_d (or C), and one E, or with ``law`` a power of v0.
 
@@ -62,7 +65,7 @@ def fit_jointly(fits: Sequence[Fit], law: bool) -> Joint:
         raise NotFitted("no joint fit: E over v0 takes drops at different speeds; these are within 5 % of each other")
     away = np.log(speeds / v_ref)
     x, common = [fit.best.x.copy() for fit in fits], _begin(fits, shared, away)
-    best, normal = math.inf, np.eye(len(shared))
+    best, normal, begun = math.inf, np.eye(len(shared)), float(common[0])
     for _ in range(_MOST):
         _share(x, common, shared, away)
         parts = [fit.problem.residuals(own) for fit, own in zip(fits, x, strict=True)]
@@ -74,6 +77,10 @@ def fit_jointly(fits: Sequence[Fit], law: bool) -> Joint:
                 common[k] = max(common[k], 0.0)
         if float(step @ normal @ step) < _DONE:
             break
+        if not (math.isfinite(best) and np.isfinite(common).all() and abs(common[0] - begun) < _FAR):
+            raise NotFitted("no joint fit: the drops have no E in common; `groups` has E of each")
+    else:
+        raise NotFitted("no joint fit: the drops disagree so far that no common values are found; see `groups`")
     separate = sum(fit.best.chi2 for fit in fits)
     freedom = len(fits) * sum(at != SLOPE for at in shared) - len(shared)
     lost = max(best - separate, 0.0)
@@ -131,6 +138,7 @@ def _stepped(
     on = np.array([not (at in (FLOW, DAMPER) and common[k] <= 0 and pull[k] > 0) for k, at in enumerate(shared)])
     step = np.zeros(len(shared))
     step[on] = -np.linalg.solve(normal[np.ix_(on, on)], pull[on])
+    step *= min(1.0, _LONGEST / max(float(np.abs(step[0])), 1e-12))
     for fit, mine, own, (inverse, across, g) in zip(fits, x, own_of, kept, strict=True):
         low, high = fit.problem.bounds()
         mine[own] = np.clip(mine[own] - inverse @ (g + across @ step), low[own], high[own])

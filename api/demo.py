@@ -1,7 +1,5 @@
 """The demo: P1's CR-39 drops on the emulator, over SCPI and over Modbus, found values beside set and published ones."""
 
-import json
-import socket
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +9,9 @@ from rich.table import Table
 from api.answer import answer_of
 from api.commands.live import follow
 from api.commands.show import value_with_u
+from api.demo_rig import RIG_FILE, TEST_FILE, Control, drop
 from api.early import start
-from api.process import Acquisition, Emulator, ProcessError
+from api.process import Emulator, ProcessError
 from daq.store import Store
 
 DROPS = {
@@ -32,47 +31,6 @@ WIDER = 2.2
 """Times a 95 % interval: what holds the truth in all 18 of a demo but once in some 3,000."""
 LIMIT_U = 4.0
 """Deviation, in standard uncertainties, that noise explains: of 24 findings one lies beyond it once in 600 demos."""
-
-TEST_FILE = """[dart]
-mass_kg = 0.503
-tip_radius_mm = 6.35
-
-[specimen]
-id = "CR-39 no. {number}"
-material = "CR-39"
-thickness_mm = 4.6
-nu = 0.30
-
-[support]
-kind = "ring"
-radius_mm = 30
-"""
-
-RIG_FILE = """[recorder]
-driver = "{driver}"
-port = "{port}"
-sample_rate_Hz = 500e3
-samples = 250_000          # 0.5 s: the second contact is in the record
-pretrigger = 1000
-trigger_level = 60         # N
-
-[[recorder.channel]]
-name = "tup"
-counts_to_unit = 0.390625  # N a count: 14 bits over ±3200 N
-range = 3200
-
-[gate]
-driver = "{driver}"
-port = "{port}"
-flag_width_mm = 10
-gap_mm = 20
-wait_s = 0.2
-
-[interlock]
-driver = "{driver}"
-port = "{port}"
-wait_s = 10                # for the dart to come to rest and be clamped again
-"""
 
 
 def run_demo(data: Path) -> bool:
@@ -97,21 +55,13 @@ def run_demo(data: Path) -> bool:
                 hand.ask(do="specimen", **dict(zip(("E_GPa", "C_i", "C_d"), specimen, strict=True)))
                 hand.ask(do="height", v0=v0)
                 acquisition = start(rig_file, test_file, data, "demo CR-39")
-                truth = _drop(acquisition, hand)
+                truth = drop(acquisition, hand)
                 end = follow(acquisition, as_json=False)
                 if end["event"] != "done":
                     raise ProcessError(end["text"])
                 found.append((v0, driver, truth, answer_of(store, end["run"])))
     agreed = _print_table(found)
     return _print_fits(found) and agreed
-
-
-def _drop(acquisition: Acquisition, hand: "Control") -> dict[str, Any]:
-    """Let go once the recorder is armed; the truth of the drop."""
-    for event in acquisition:
-        if event["event"] == "armed":
-            return hand.ask(do="release")["truth"]
-    raise ProcessError(acquisition.events[-1].get("text", "acquisition ended before it armed"))
 
 
 def _print_table(found: list[tuple[float, str, dict[str, Any], dict[str, Any]]]) -> bool:
@@ -205,32 +155,3 @@ def _compare(finding: dict[str, Any], truth: float, factor: float) -> tuple[str,
     off = (value - truth) / u
     good = abs(off) <= LIMIT_U
     return f"{value_with_u(value, u, factor)} ({off:+.1f}){'' if good else ' !'}", good
-
-
-class Control:
-    """The operator's hand at the emulator: one JSON line asked, one answered."""
-
-    def __init__(self, endpoint: str) -> None:
-        host, _, port = endpoint.rpartition("//")[2].rpartition(":")
-        self._socket = socket.create_connection((host, int(port)), timeout=30)
-        self._lines = self._socket.makefile("r", encoding="utf-8")
-
-    def ask(self, **request: Any) -> dict[str, Any]:
-        """The answer to a request.
-
-        Raises
-        ------
-        ProcessError : the emulator refused it.
-        """
-        self._socket.sendall(json.dumps(request).encode() + b"\n")
-        answer = json.loads(self._lines.readline() or '{"ok": false, "error": "the emulator has gone"}')
-        if not answer.get("ok"):
-            raise ProcessError(f"the emulator refused {request}: {answer.get('error')}")
-        return answer
-
-    def __enter__(self) -> "Control":
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        self._lines.close()
-        self._socket.close()

@@ -129,12 +129,13 @@ def _ratio(found: Interval) -> dict[str, Any]:
 
 
 def by_thickness(rows: list[dict[str, Any]], members: list[list[Drop]]) -> dict[str, Any] | None:
-    """From which thickness on F(t) stays the same; None where thickness alone does not vary."""
-    single = [(row, some) for row, some in zip(rows, members, strict=True) if row["by"].get("stack") is None]
-    others = [{k: v for k, v in row["by"].items() if k not in ("thickness_mm", "stack")} for row, _ in single]
-    if len(single) < 3 or any(other != others[0] for other in others):
-        return None
-    found = thickness_threshold({row["by"]["thickness_mm"] * 1e-3: curves(some) for row, some in single})
+    """From which thickness on F(t) stays the same, among the most drops that differ in nothing else; None: too few."""
+    alike: dict[str, dict[float, list[dict[str, float]]]] = {}
+    for row, some in zip(rows, members, strict=True):
+        others = {k: v for k, v in row["by"].items() if k != "thickness_mm"}
+        if "thickness_mm" in row["by"] and not others.pop("stack", None):
+            alike.setdefault(repr(others), {})[row["by"]["thickness_mm"] * 1e-3] = curves(some)
+    found = thickness_threshold(max(alike.values(), key=len, default={}))
     if found is None:
         return None
     told = [

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from daq.corrections import value_of
 from daq.csv_file import read_csv
 from daq.errors import ImportFileError, SettingsError
 from daq.lvm_file import MAGIC, read_lvm
@@ -71,8 +72,8 @@ def _value(text: str, key: str) -> Any:
     text = text.strip()
     if key == "specimen_id" or key.endswith((".id", ".name", ".batch", ".note", ".material")):
         return text
-    if text in ("true", "false"):
-        return text == "true"
+    if text in ("true", "false") or text.startswith("["):
+        return value_of(text)
     try:
         return float(text)
     except ValueError:

@@ -27,14 +27,20 @@ def serve(
 
 
 def demo(
-    once: Annotated[bool, typer.Option("--once", help="End after the table.")] = False,
+    once: Annotated[bool, typer.Option("--once", help="End after the report, open nothing.")] = False,
     data: Annotated[Path, typer.Option("--data", help="Data folder.", metavar="DIR")] = Path("demo-data"),
 ) -> None:
-    """Play the CR-39 series of the published tests on the emulator, over both wires, and show what is found."""
+    """Play the published CR-39 tests on the emulator, over both wires, then a series that fails; show what is found."""
+    import webbrowser
+
     from api.demo import run_demo
+    from api.demo_series import run_series
 
     agreed = run_demo(data)
+    report = run_series(data)
+    tell(f"the report of the series is {report}")
     if not once:
+        webbrowser.open(report.resolve().as_uri())
         serve(data, None, "127.0.0.1", 8000)
     if not agreed:
         raise typer.Exit(1)

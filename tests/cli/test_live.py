@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from emulator import Emulator, until
+from playwright.sync_api import sync_playwright
+from records import need
 from rigs import write_rig, write_test
 
 DROPTOWER = Path(sys.executable).with_name("droptower")
@@ -108,7 +110,15 @@ def test_the_demo_agrees_with_what_the_emulator_was_set_to(tmp_path: Path) -> No
     assert "all hold the set value" in done.stdout
     for published in ("709", "1045", "2.61"):
         assert published in done.stdout
-    assert len(list((tmp_path / "d" / "runs").iterdir())) == 6
+    assert "told rightly of 8" in done.stdout
+    assert len(list((tmp_path / "d" / "runs").iterdir())) == 6 + 8
+    with sync_playwright() as p:
+        browser = p.chromium.launch(executable_path=need("chromium"), args=["--no-sandbox", "--disable-gpu"])
+        page = browser.new_page()
+        page.goto((tmp_path / "d" / "demo-report.html").as_uri())
+        assert page.locator("h1").inner_text() == "demo CR-39 to failure"
+        assert page.locator("svg").count() > 8
+        browser.close()
 
 
 def _asked(command: list[Any], answer: str) -> tuple[int, str]:

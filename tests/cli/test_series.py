@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
+import pandas
 import pytest
 from playwright.sync_api import sync_playwright
 from records import need
 
+from api import frames
+from api.figure_series import FIGURES
+from daq.catalog import Catalog
+from daq.store import Store
 from sim_device.fall import Motion
 from sim_device.sensors import signal, white
 from sim_device.settings import Hang, Rig, Sensor, Specimen
@@ -73,6 +79,7 @@ def found(series_data: Path) -> dict:
     done = subprocess.run([DROPTOWER, "series", "CR-39", *data, "--json"], check=True, capture_output=True, text=True)
     shown = subprocess.run([DROPTOWER, "series", "CR-39", *data], check=True, capture_output=True, text=True)
     assert "v0_fail" in shown.stdout
+    assert "speed at which half" in shown.stdout
     return json.loads(done.stdout)
 
 
@@ -107,7 +114,7 @@ def test_the_report_is_one_file_that_needs_no_network(found: dict, tmp_path: Pat
         assert loads not in text
     for run in found["runs"]:
         assert run["run"] in text
-    for word in ("v0 fail", "sigma r as published", "SHA-256", "P1 (15)", "beyond-plate-inertia"):
+    for word in ("v<sub>0,fail</sub>", "σ<sub>r</sub> as published", "SHA-256", "P1 (15)", "beyond-plate-inertia"):
         assert word in text
     wrong = [DROPTOWER, "report", "x", "--data", series_data, "-o", out]
     done = subprocess.run(wrong, capture_output=True, text=True)
@@ -125,8 +132,87 @@ def test_the_report_opens_in_a_browser(found: dict, tmp_path: Path, series_data:
         asked: list[str] = []
         page.on("request", lambda r: asked.append(r.url))
         page.goto(out.as_uri())
-        assert page.locator("svg").count() == 1 + len(found["runs"])
+        assert page.locator("svg").count() == len(FIGURES) + len(found["runs"])
         width = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
         browser.close()
     assert width <= 0, "nothing is cut off at the right"
     assert asked == [out.as_uri()]
+
+
+def test_the_load_lasts_shorter_from_the_failure_on(found: dict) -> None:
+    change = found["transition"]
+    assert change["v0_lo"]["value"] == found["v0_survived_max"]["value"]
+    assert change["v0_hi"]["value"] == found["v0_failed_min"]["value"]
+    assert change["ratio"] < 0.6
+    assert change["F_M_after"]["value"] == pytest.approx(1800, rel=0.02)
+
+
+def test_plate_theory_is_checked_at_failure(found: dict) -> None:
+    """P1's CR-39 bends by 0.59 of its thickness at rupture."""
+    words = {row["check"]: row for row in found["plate_checks"]}
+    assert words["thin-plate"]["value"] == pytest.approx(4.6 / 60)
+    assert words["deflection"]["value"] == pytest.approx(0.59, abs=0.05)
+    assert words["deflection"]["word"] == "beyond"
+
+
+def test_the_report_as_pdf(series_data: Path, tmp_path: Path) -> None:
+    out = tmp_path / "report.pdf"
+    subprocess.run([DROPTOWER, "report", "CR-39", "--data", series_data, "-o", out], check=True, capture_output=True)
+    content = out.read_bytes()
+    assert content.startswith(b"%PDF")
+    assert len(content) > 100_000, "the figures are in it"
+    wrong = subprocess.run(
+        [DROPTOWER, "report", "CR-39", "--data", series_data, "-o", tmp_path / "r.doc"], capture_output=True, text=True
+    )
+    assert wrong.returncode == 2
+    assert ".html nor .pdf" in wrong.stderr
+
+
+def test_tables_and_figures_of_a_series(series_data: Path, tmp_path: Path, found: dict) -> None:
+    for suffix in ("csv", "parquet"):
+        options = ["--table", tmp_path / f"t.{suffix}", "--plot", tmp_path / "figures"]
+        subprocess.run([DROPTOWER, "series", "CR-39", "--data", series_data, *options], check=True, capture_output=True)
+    read = [pandas.read_csv(tmp_path / "t.csv"), pandas.read_parquet(tmp_path / "t.parquet")]
+    for table in read:
+        by_run = table.set_index("run")
+        for run in found["runs"]:
+            row = by_run.loc[run["run"]]
+            assert pytest.approx(run["F_M"]["value"]) == row.F_M
+            assert bool(row.failed_counted) is run["failed"]["counted"]
+            assert row.thickness == pytest.approx(4.6e-3)
+    for name in FIGURES:
+        assert (tmp_path / "figures" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+        assert "<svg" in (tmp_path / "figures" / f"{name}.svg").read_text()
+
+
+def test_frames_for_python(series_data: Path, found: dict) -> None:
+    frame = frames.series(series_data, "CR-39")
+    assert sorted(frame.index) == sorted(run["run"] for run in found["runs"])
+    intact = next(run for run in found["runs"] if run["failed"]["value"] is False)
+    data = frames.contact(series_data, intact["run"])
+    assert float(data.alpha.max()) == pytest.approx(intact["alpha_M"]["value"], rel=1e-3)
+    assert data.attrs["F_M"] == intact["F_M"]["value"]
+    assert data.force.attrs["units"] == "N"
+
+
+def test_the_operator_overrules_and_both_are_kept(series_data: Path, found: dict, tmp_path: Path) -> None:
+    data = tmp_path / "data"
+    shutil.copytree(series_data, data)
+    run = next(run["run"] for run in found["runs"] if run["failed"]["value"] is True)
+    said = ["--author", "A. Operator", "--reason", "looked at it"]
+    change = ["--set", "measured.failure_type=YU", "--set", "specimen.material=CR-39 aged"]
+    subprocess.run([DROPTOWER, "correct", run, "--data", data, *change, *said], check=True, capture_output=True)
+    done = subprocess.run(
+        [DROPTOWER, "analyze", run, "--data", data, "--json"], check=True, capture_output=True, text=True
+    )
+    findings = json.loads(done.stdout)["findings"]
+    assert findings["failure_type"]["value"] == "NY"
+    assert findings["failure_type_operator"]["value"] == "YU"
+    assert (data / "runs" / run / "test-0002.toml").read_text().count("A. Operator") == 1
+    assert next(r for r in Catalog(Store(data)).runs() if r.run == run).material == "CR-39 aged"
+    wrong = ["--set", "measured.failure_type=broken", *said]
+    refused = subprocess.run([DROPTOWER, "correct", run, "--data", data, *wrong], capture_output=True, text=True)
+    assert refused.returncode == 1
+    assert "failure_type" in refused.stderr
+    assert not (data / "runs" / run / "test-0003.toml").exists()
+    assert subprocess.run([DROPTOWER, "verify", "--data", data], capture_output=True).returncode == 0
