@@ -26,6 +26,8 @@ _RINGS = np.arange(3e3, 14.1e3, 0.5e3)
 """Hz."""
 _DECAY = 10e-6
 """s, in which a crack takes its share of the load to 1/e."""
+_COVERED = 60e-6
+"""s on either side of a moment that was searched."""
 _CLEAR = 15e-6
 """s from either end of contact that are left alone."""
 _SHARES = (0.03, 0.6)
@@ -76,8 +78,19 @@ def find_loss(t: Array, force: Array, start: float, end: float, noise: float) ->
     t, force : (n,) s and N. A plate that shakes all along has such places, so a loss has to be confirmed: `partial`.
     """
     piece = _piece(t, force, start, end, noise)
-    centres = {int(at[np.argmax(like)]) for at, like in _scan(piece) if like.max(initial=0.0) > LOST}
-    found = [loss for centre in centres if (loss := _located(piece, centre)) is not None and loss.gain > LOST]
+    tops = sorted(
+        ((float(like.max()), int(at[np.argmax(like)])) for at, like in _scan(piece) if like.size), reverse=True
+    )
+    tried: list[int] = []
+    found: list[Loss] = []
+    for gain, centre in tops:
+        # The search around a moment covers what is near it.
+        if gain <= LOST or any(abs(centre - other) * piece.step < _COVERED for other in tried):
+            continue
+        loss = _located(piece, centre)
+        if loss is not None and loss.gain > LOST:
+            tried.append(centre)
+            found.append(loss)
     return max(found, key=lambda loss: loss.gain, default=None)
 
 
@@ -152,16 +165,17 @@ def _located(piece: _Piece, centre: int) -> Loss | None:
     origin = float(piece.t[centre])
     s, y = piece.t[first:last] - origin, np.concatenate((piece.force[first:last], np.zeros(6)))
     n, edge = s.size, 8
-    without, best = math.inf, (math.inf, 0.0, 0.0)
-    for f in _RINGS:
-        rest, fixed = _rest(piece, y, s, f)
-        without = min(without, float(rest @ rest))
-        for at in s[edge:-edge] - piece.step / 2:
-            best = min(best, (_left(piece, rest, fixed, s, float(at), f), float(at), float(f)))
-    _, at, f = best
-    rest, fixed = _rest(piece, y, s, f)
+    rests = {float(f): _rest(piece, y, s, float(f)) for f in _RINGS}
+    without = min(float(rest @ rest) for rest, _ in rests.values())
+
+    def left(at: float, f: float) -> tuple[float, float, float]:
+        return _left(piece, *rests[f], s, at, f), at, f
+
+    coarse = s[edge:-edge:2] - piece.step / 2
+    _, at, _ = min(left(float(each), f) for f in rests for each in coarse)
+    _, at, f = min(left(at + each * piece.step, f) for f in rests for each in (-1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5))
     fine = at + np.arange(-1.5, 1.51, 0.125) * piece.step
-    chi2 = np.array([_left(piece, rest, fixed, s, float(each), f) for each in fine])
+    chi2 = np.array([left(float(each), f)[0] for each in fine])
     k = int(np.argmin(chi2))
     columns = _columns(piece, s - fine[k], 0.0, f)
     a, *_ = np.linalg.lstsq(columns, y, rcond=None)
