@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 INSTALL := $(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: setup demo test coverage bench faults kills lint clean
+.PHONY: setup demo test coverage studies bench faults kills lint clean
 setup: .venv/installed
 
 .venv/installed: pyproject.toml constraints.txt
@@ -29,6 +29,13 @@ test: .venv/installed-dev
 coverage: .venv/installed-dev
 	$(BIN)/python bench/coverage_events.py
 	$(BIN)/python bench/coverage_fits.py
+
+# Failures, cracks and slips found and not; v0_fail and the threshold of thickness; docs/series.md quotes them. An hour.
+STUDIES ?= 2000
+studies: .venv/installed-dev
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/failure.py --drops $(STUDIES)
+	$(BIN)/python bench/series.py
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/thickness.py
 
 # Readout and storage against bare loops on the same wires and disk, fits against peers; ten minutes, most of it at 115,200 baud.
 bench: .venv/installed-dev

@@ -134,7 +134,7 @@ def curve(title: str, loud: list[Seen], kind: str) -> None:
 
 
 def main() -> None:
-    """Print the tables."""
+    """Print the tables; exit 1 where an intact specimen was called failed, or a complete failure missed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--drops", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=1)
@@ -161,6 +161,8 @@ def main() -> None:
     print(f"| cracks: share of the stiffness within 0.03 | {100 * np.mean(np.abs(share) < 0.03):.1f} % | |")
     curve("complete failures", study(drops // 2, seed, "failing", 0.15), "complete")
     curve("cracks", study(drops // 2, seed, "cracking", 0.15), "partial")
+    if any(s.failed for s in (*intact, *shaking, *slipping)) or len(complete) < len(failing):
+        sys.exit("a drop was called failed that was not, or a failure was missed")
 
 
 if __name__ == "__main__":
