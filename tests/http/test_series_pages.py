@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import httpx2
+from emulator import until
 from playwright.sync_api import Page
 
 
@@ -39,12 +40,12 @@ def test_the_page_of_a_series(served: tuple[str, list[str]], open_page: Callable
     page = open_page(f"{served[0]}/series/other")
     assert page.locator("h2").first.inner_text() == "other"
     assert "b-1" in page.locator("table").first.inner_text()
-    for image in page.locator("img[src*=figures]").all():
+    pictures = page.locator("img[src*=figures]")
+    for image in pictures.all():
         image.scroll_into_view_if_needed()
-    page.wait_for_function(
-        "[...document.querySelectorAll('img[src*=figures]')].every(i => i.complete && i.naturalWidth > 0)",
-        timeout=60_000,
-    )
+        # The page forbids eval, so no function is waited for.
+        until(lambda image=image: image.evaluate("i => i.complete && i.naturalWidth > 0"), 60)
+    assert pictures.count() == 5
     width = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
     assert width <= 0
 
