@@ -15,10 +15,11 @@ from daq.errors import StoreError
 from daq.store import Store
 
 FORMATS = (".html", ".pdf")
+_WIDE, _SMALL = 8, "6.2pt"
+"""Columns beyond which a table is set smaller."""
 TYPST_HEAD = """#set page(paper: "a4", margin: (x: 16mm, top: 16mm, bottom: 18mm), numbering: "1 / 1")
 #set text(size: 8.5pt, hyphenate: false)
 #set par(leading: 0.55em)
-#show table: set text(size: 7.4pt)
 #set table(stroke: (x, y) => (bottom: 0.4pt + luma(80%)), inset: (x: 4pt, y: 3pt))
 #show heading.where(level: 1): set text(size: 17pt)
 #show heading.where(level: 2): set text(size: 12pt)
@@ -90,14 +91,16 @@ def _table(table: Table) -> str:
     if width == 0:
         return ""
     sides = ", ".join("left" if k in table.words else "right" for k in range(width))
-    cells = [
-        f"[{typeset(c)}]" if k in table.words else f"[#box[{typeset(c)}]]"
-        for row in table.rows
-        for k, c in enumerate(row)
-    ]
+    cells = [f"[{typeset(c) if k in table.words else _whole(c)}]" for row in table.rows for k, c in enumerate(row)]
     head = f"table.header({', '.join(f'[*{typeset(c)}*]' if c else '[]' for c in table.head)}), " if table.head else ""
     columns = ", ".join("auto" for _ in range(width))
-    return f"#table(columns: ({columns},), align: ({sides},), {head}{', '.join(cells)})"
+    drawn = f"table(columns: ({columns},), align: ({sides},), {head}{', '.join(cells)})"
+    return f"#[#set text(size: {_SMALL}); #{drawn}]" if width > _WIDE else f"#[#set text(size: 7.4pt); #{drawn}]"
+
+
+def _whole(cell: Cell) -> str:
+    """A number with its unit, on one line."""
+    return typeset(cell).replace(" ", "~").replace("/", "/\u2060")
 
 
 def typeset(text: Cell) -> str:

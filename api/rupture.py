@@ -15,7 +15,8 @@ def rupture_of(drops: list[Drop]) -> tuple[dict[str, Any], list[dict[str, str]]]
     unknown = [drop.run.run for drop in drops if drop.failed is None]
     if unknown:
         text = (
-            f"{len(unknown)} runs neither rebound nor fail for sure and are left out of v0_fail: {', '.join(unknown)}; "
+            f"{len(unknown)} of {len(drops)} runs neither rebound nor fail for sure and are left out of v0_fail: "
+            f"{', '.join(unknown)}; "
             "say what is seen on the specimen by `droptower correct RUN --set measured.failed=true`"
         )
         warnings.append({"code": "outcome-unknown", "text": text})

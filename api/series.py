@@ -85,6 +85,10 @@ def _joint(drops: list[Drop]) -> tuple[dict[str, Any], list[dict[str, str]]]:
     for drop in drops:
         if drop.failed is True:
             continue  # what is left of its record is no equal of the others
+        if "restitution-impossible" in [w["code"] for w in drop.answer["warnings"]]:
+            text = f"{drop.run.run} gives back more than it got: it is left out of the joint fit"
+            warnings.append({"code": "left-out", "text": text})
+            continue
         if isinstance(drop.fit, NotFitted):
             warnings.append({"code": "not-fitted", "text": f"{drop.run.run}: {drop.fit}"})
         else:

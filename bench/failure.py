@@ -140,9 +140,9 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
     drops, seed = given.drops, given.seed
-    intact, shaking = study(drops, seed, "intact", 0.15), study(drops // 4, seed, "shaking", 0.05)
+    intact, shaking = study(drops, seed, "intact", 0.15), study(drops // 10, seed, "shaking", 0.05)
     failing, cracking = study(drops, seed, "failing", 0.05), study(drops, seed, "cracking", 0.05)
-    slipping = study(drops // 4, seed, "slipping", 0.05)
+    slipping = study(drops // 10, seed, "slipping", 0.05)
     complete = [s for s in failing if s.kind == "complete"]
     partial = [s for s in cracking if s.kind == "partial"]
     print("| what | found | reach |\n|---|---|---|")
@@ -159,8 +159,8 @@ def main() -> None:
     near(partial, "cracks")
     share = np.array([s.off_share for s in partial])
     print(f"| cracks: share of the stiffness within 0.03 | {100 * np.mean(np.abs(share) < 0.03):.1f} % | |")
-    curve("complete failures", study(drops // 2, seed, "failing", 0.15), "complete")
-    curve("cracks", study(drops // 2, seed, "cracking", 0.15), "partial")
+    curve("complete failures", study(drops // 4, seed, "failing", 0.15), "complete")
+    curve("cracks", study(drops // 4, seed, "cracking", 0.15), "partial")
     if any(s.failed for s in (*intact, *shaking, *slipping)) or len(complete) < len(failing):
         sys.exit("a drop was called failed that was not, or a failure was missed")
 
