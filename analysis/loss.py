@@ -21,7 +21,7 @@ _STEP = 4e-6
 """s: samples closer than that are averaged."""
 _BEFORE, _AFTER = (250e-6, 130e-6, 70e-6), (250e-6, 120e-6)
 """s of record around a moment; the shorter where the contact has begun or is over."""
-_SCALE = 250e-6
+_SCALE, _FEWEST = 250e-6, 40
 _RINGS = np.arange(3e3, 14.1e3, 0.5e3)
 """Hz."""
 _DECAY = 10e-6
@@ -78,6 +78,8 @@ def find_loss(t: Array, force: Array, start: float, end: float, noise: float) ->
     t, force : (n,) s and N. A plate that shakes all along has such places, so a loss has to be confirmed: `partial`.
     """
     piece = _piece(t, force, start, end, noise)
+    if piece is None:
+        return None
     tops = sorted(
         ((float(like.max()), int(at[np.argmax(like)])) for at, like in _scan(piece) if like.size), reverse=True
     )
@@ -94,15 +96,19 @@ def find_loss(t: Array, force: Array, start: float, end: float, noise: float) ->
     return max(found, key=lambda loss: loss.gain, default=None)
 
 
-def _piece(t: Array, force: Array, start: float, end: float, noise: float) -> _Piece:
+def _piece(t: Array, force: Array, start: float, end: float, noise: float) -> _Piece | None:
     dt = float(t[1] - t[0])
     block = max(1, round(_STEP / dt))
     first, last = np.searchsorted(t, [start + _CLEAR, end - _CLEAR])
     n = max(0, int(last - first)) // block
+    if n < _FEWEST:
+        return None
     part = slice(int(first), int(first) + n * block)
     means = [a[part].reshape(n, block).mean(axis=1) for a in (t, force)]
-    top = float(means[1].max(initial=0.0))
-    return _Piece(means[0], means[1], block * dt, max(noise / math.sqrt(block), 1e-5 * top), top)
+    top = float(means[1].max())
+    return (
+        None if not top > 0 else _Piece(means[0], means[1], block * dt, max(noise / math.sqrt(block), 1e-5 * top), top)
+    )
 
 
 def _columns(piece: _Piece, s: Array, at: float, frequency: float) -> Array:

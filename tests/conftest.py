@@ -5,7 +5,23 @@ from pathlib import Path
 
 import pytest
 from emulator import Emulator
-from records import CR39, SHARED, half_sine
+from playwright.sync_api import Browser, sync_playwright
+from records import CR39, SHARED, half_sine, need
+
+CHROMIUM = [
+    "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync",
+]  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    """A real one, the same for all tests of a worker: two cannot be driven side by side."""
+    path = need("chromium")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=CHROMIUM)
+        yield browser
+        browser.close()
 
 
 @pytest.fixture

@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from emulator import Emulator, until
-from playwright.sync_api import sync_playwright
-from records import need
+from playwright.sync_api import Browser
 from rigs import write_rig, write_test
 
 DROPTOWER = Path(sys.executable).with_name("droptower")
@@ -103,7 +102,7 @@ def test_sim_prints_its_endpoints_and_ends_quietly() -> None:
     assert "Traceback" not in err
 
 
-def test_the_demo_agrees_with_what_the_emulator_was_set_to(tmp_path: Path) -> None:
+def test_the_demo_agrees_with_what_the_emulator_was_set_to(tmp_path: Path, browser: Browser) -> None:
     done = subprocess.run([DROPTOWER, "demo", "--once", "--data", tmp_path / "d"], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "All 24 findings agree with the set values" in done.stdout
@@ -112,13 +111,11 @@ def test_the_demo_agrees_with_what_the_emulator_was_set_to(tmp_path: Path) -> No
         assert published in done.stdout
     assert "told rightly of 8" in done.stdout
     assert len(list((tmp_path / "d" / "runs").iterdir())) == 6 + 8
-    with sync_playwright() as p:
-        browser = p.chromium.launch(executable_path=need("chromium"), args=["--no-sandbox", "--disable-gpu"])
-        page = browser.new_page()
-        page.goto((tmp_path / "d" / "demo-report.html").as_uri())
-        assert page.locator("h1").inner_text() == "demo CR-39 to failure"
-        assert page.locator("svg").count() > 8
-        browser.close()
+    page = browser.new_page()
+    page.goto((tmp_path / "d" / "demo-report.html").as_uri())
+    assert page.locator("h1").inner_text() == "demo CR-39 to failure"
+    assert page.locator("svg").count() > 8
+    page.close()
 
 
 def _asked(command: list[Any], answer: str) -> tuple[int, str]:

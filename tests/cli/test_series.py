@@ -11,8 +11,7 @@ from pathlib import Path
 import numpy as np
 import pandas
 import pytest
-from playwright.sync_api import sync_playwright
-from records import need
+from playwright.sync_api import Browser
 
 from api import frames
 from api.figure_series import FIGURES
@@ -122,19 +121,16 @@ def test_the_report_is_one_file_that_needs_no_network(found: dict, tmp_path: Pat
     assert "no run of a series 'x'" in done.stderr
 
 
-def test_the_report_opens_in_a_browser(found: dict, tmp_path: Path, series_data: Path) -> None:
+def test_the_report_opens_in_a_browser(found: dict, tmp_path: Path, series_data: Path, browser: Browser) -> None:
     out = tmp_path / "report.html"
     subprocess.run([DROPTOWER, "report", "CR-39", "--data", series_data, "-o", out], check=True, capture_output=True)
-    path = need("chromium")
-    with sync_playwright() as p:
-        browser = p.chromium.launch(executable_path=path, args=["--no-sandbox", "--disable-gpu"])
-        page = browser.new_page()
-        asked: list[str] = []
-        page.on("request", lambda r: asked.append(r.url))
-        page.goto(out.as_uri())
-        assert page.locator("svg").count() == len(FIGURES) + len(found["runs"])
-        width = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
-        browser.close()
+    page = browser.new_page()
+    asked: list[str] = []
+    page.on("request", lambda r: asked.append(r.url))
+    page.goto(out.as_uri())
+    assert page.locator("svg").count() == len(FIGURES) + len(found["runs"])
+    width = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
+    page.close()
     assert width <= 0, "nothing is cut off at the right"
     assert asked == [out.as_uri()]
 

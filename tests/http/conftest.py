@@ -8,16 +8,10 @@ import numpy as np
 import pytest
 from emulator import Emulator
 from fastapi import FastAPI
-from playwright.sync_api import Browser, Page, sync_playwright
-from records import need
+from playwright.sync_api import Browser, Page
 from services import LONG, SPIKE, drop, publish, run_of, running
 
 from api.http.service import create_app
-
-CHROMIUM = [
-    "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync",
-]  # fmt: skip
 
 
 @pytest.fixture(scope="session")
@@ -45,15 +39,6 @@ def runs(served: tuple[str, list[str]]) -> list[str]:
 def client(served: tuple[str, list[str]]) -> Iterator[httpx2.Client]:
     with httpx2.Client(base_url=served[0], timeout=20) as client:
         yield client
-
-
-@pytest.fixture(scope="session")
-def browser() -> Iterator[Browser]:
-    path = need("chromium")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=CHROMIUM)
-        yield browser
-        browser.close()
 
 
 @pytest.fixture
