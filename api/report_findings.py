@@ -18,7 +18,7 @@ def failure(drops: list[Drop], series: dict[str, Any]) -> list[Block]:
     """What failed, when and at what; nothing where none did."""
     failed = [d for d in drops if d.failed]
     if not failed:
-        return []
+        return _staircase(series)
     rows: list[list[Cell]] = []
     for d in failed:
         found = d.answer["findings"]
@@ -49,7 +49,23 @@ def failure(drops: list[Drop], series: dict[str, Any]) -> list[Block]:
             f"Without a look at which failed: between {change['v0_lo']['value']:.3g} and "
             f"{change['v0_hi']['value']:.3g} m/s the load begins to last {change['ratio']:.2f} of what it did."
         ))  # fmt: skip
-    return out
+    return out + _staircase(series)
+
+
+def _staircase(series: dict[str, Any]) -> list[Block]:
+    """The up-and-down method, where the heights are a ladder."""
+    steps = series["staircase"]
+    if steps is None:
+        return []
+    E, deviation = steps["E_50"], steps["deviation"]["value"]
+    half = "not yet known" if E["value"] is None else f"{with_u('E_50', E)}"
+    spread = "" if deviation is None else f", deviation {deviation:.2g} J between specimens"
+    return [
+        Text(
+            f"Up and down over {steps['drops']} drops (Dixon and Mood): half fail at {half}{spread}; "
+            f"next height {steps['next_height_mm']:g} mm."
+        )
+    ]
 
 
 def by_groups(series: dict[str, Any]) -> list[Block]:
