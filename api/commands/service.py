@@ -31,8 +31,6 @@ def demo(
     data: Annotated[Path, typer.Option("--data", help="Data folder.", metavar="DIR")] = Path("demo-data"),
 ) -> None:
     """Play the published CR-39 tests on the emulator, over both wires, then a series that fails; show what is found."""
-    import webbrowser
-
     from api.demo import run_demo
     from api.demo_series import run_series
 
@@ -40,7 +38,17 @@ def demo(
     report = run_series(data)
     tell(f"the report of the series is {report}")
     if not once:
-        webbrowser.open(report.resolve().as_uri())
+        open_in_browser(report)
         serve(data, None, "127.0.0.1", 8000)
     if not agreed:
         raise typer.Exit(1)
+
+
+def open_in_browser(path: Path) -> None:
+    """Open a file in the browser, where there is a screen for one: a browser of the terminal would stand in the way."""
+    import os
+    import sys
+    import webbrowser
+
+    if sys.platform != "linux" or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"):
+        webbrowser.open(path.resolve().as_uri())

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import pytest
 from emulator import Emulator, until
 from playwright.sync_api import Browser
 from rigs import write_rig, write_test
@@ -161,3 +162,16 @@ def test_a_specimen_that_was_hit_is_asked_about_on_a_terminal(tmp_path: Path) ->
         refused = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL)
         assert refused.returncode == 1
         assert "--again" in refused.stderr
+
+
+@pytest.mark.parametrize("screen", [":0", ""])
+def test_the_report_is_opened_where_there_is_a_screen(tmp_path: Path, screen: str) -> None:
+    browser, opened = tmp_path / "browser", tmp_path / "opened"
+    browser.write_text(f'#!/bin/sh\necho "$1" > {opened}\n')
+    browser.chmod(0o755)
+    code = "import sys, pathlib; from api.commands.service import open_in_browser as o; o(pathlib.Path(sys.argv[1]))"
+    kept = {k: v for k, v in os.environ.items() if k != "WAYLAND_DISPLAY"}
+    environment = {**kept, "DISPLAY": screen, "BROWSER": str(browser)}
+    subprocess.run([sys.executable, "-c", code, tmp_path / "demo-report.html"], check=True, env=environment)
+    told = opened.read_text().strip() if opened.exists() else ""
+    assert told == ((tmp_path / "demo-report.html").as_uri() if screen else "")
