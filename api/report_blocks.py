@@ -81,7 +81,10 @@ def _table_of_drops(drops: list[Drop], series: dict[str, Any]) -> Table:
                 "–" if E is None else with_u("E", {**E, "u": E["u_total"]}), kind, mark,
             ]
         )  # fmt: skip
-    return Table(["Specimen", *(sign_of(s) for s in (*TOLD, "E")), "Failed", "Outlier"], rows, (0, 8, 9))
+    head = ["Specimen", *(sign_of(s) for s in (*TOLD, "E")), "Failed", "Outlier"]
+    if not any(row[-1] for row in rows):
+        head, rows = head[:-1], [row[:-1] for row in rows]
+    return Table(head, rows, (0, 8, 9))
 
 
 def _figures(drops: list[Drop], series: dict[str, Any]) -> list[Block]:

@@ -116,6 +116,7 @@ def test_the_demo_agrees_with_what_the_emulator_was_set_to(tmp_path: Path, brows
     page.goto((tmp_path / "d" / "demo-report.html").as_uri())
     assert page.locator("h1").inner_text() == "demo CR-39 to failure"
     assert page.locator("svg").count() > 8
+    assert page.evaluate("[...document.querySelectorAll('.wide')].every(d => d.scrollWidth <= d.clientWidth)")
     page.close()
 
 
