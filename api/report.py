@@ -29,7 +29,7 @@ TYPST_HEAD = """#set page(paper: "a4", margin: (x: 16mm, top: 16mm, bottom: 18mm
 
 
 def write_report(store: Store, name: str, path: Path, progress: Callable[[int, int], None] | None = None) -> None:
-    """Write the report of a series; the suffix says what as, `progress` is told of drops done and how many there are.
+    """Write the report of a series; the suffix says what as, `progress` is told of drops read, then of drops drawn.
 
     Raises
     ------

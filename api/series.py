@@ -1,5 +1,6 @@
 """A series of runs: each fitted, and all together."""
 
+from collections.abc import Callable
 from typing import Any
 
 from analysis.fit import Fit, NotFitted
@@ -23,8 +24,8 @@ MARKED = ("F_M", "t_c", "eps_exact", "E")
 """Looked at for values that lie off the others of their group."""
 
 
-def drops_of(store: Store, name: str) -> list[Drop]:
-    """The drops of a series, oldest first, each with its answer.
+def drops_of(store: Store, name: str, progress: Callable[[int, int], None] | None = None) -> list[Drop]:
+    """The drops of a series, oldest first, each with its answer; `progress` is told how many of how many are read.
 
     Raises
     ------
@@ -35,7 +36,11 @@ def drops_of(store: Store, name: str) -> list[Drop]:
         known = sorted({row.series for row in Catalog(store).runs(limit=MOST) if row.series})
         hint = f"; it has {', '.join(map(repr, known))}" if known else ""
         raise SeriesNotFound(f"{store.folder} holds no run of a series {name!r}{hint}")
-    drops = [Drop(store.read(row.run), answer_of(store, row.run)) for row in rows]
+    drops: list[Drop] = []
+    for done, row in enumerate(rows, 1):
+        drops.append(Drop(store.read(row.run), answer_of(store, row.run)))
+        if progress is not None:
+            progress(done, len(rows))
     return sorted(drops, key=lambda drop: (drop.run.started, drop.run.run))
 
 

@@ -36,7 +36,9 @@ def corrected(run: RunData, texts: Sequence[tuple[str, str]]) -> RunData:
         try:
             test = override(test, tomllib.loads(text)["set"], name)
         except (tomllib.TOMLDecodeError, KeyError, TypeError, SettingsError) as e:
-            raise StoreError(f"{name} cannot be read: {e}") from None
+            raise StoreError(
+                f"correction {name} of run {run.run} cannot be applied: {e}; move it away, the record is whole"
+            ) from None
     g, source = resolve_g(test, run.rig)
     provenance = {**run.provenance, "corrections": [text for _, text in texts]}
     return replace(run, test=test, g=g, g_source=source, provenance=provenance)

@@ -31,7 +31,7 @@ def series(
 
     if table is not None and table.suffix not in FORMATS:
         raise typer.BadParameter(f"{table} ends in neither {' nor '.join(FORMATS)}", param_hint="--table")
-    drops = drops_of(Store(data), name)
+    drops = drops_of(Store(data), name, _counted)
     found = series_of(name, drops)
     if table is not None:
         write_table(drops, table)
@@ -59,12 +59,14 @@ def report(
     if output.suffix not in FORMATS:
         raise typer.BadParameter(f"{output} ends in neither {' nor '.join(FORMATS)}", param_hint="-o")
 
-    def told(done: int, of: int) -> None:
-        if sys.stderr.isatty():
-            print(f"\r{done} of {of} drops", end="" if done < of else "\n", file=sys.stderr, flush=True)
-
-    write_report(Store(data), name, output, told)
+    write_report(Store(data), name, output, _counted)
     tell(f"{name} written to {output}")
+
+
+def _counted(done: int, of: int) -> None:
+    """On a terminal, how far it is."""
+    if sys.stderr.isatty():
+        print(f"\r{done} of {of} drops", end="" if done < of else "\n", file=sys.stderr, flush=True)
 
 
 def _print(drops: "list[Drop]", found: dict[str, Any]) -> None:
