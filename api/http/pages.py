@@ -96,6 +96,7 @@ def one_run(request: Request, shared: Shared, run: str) -> Response:
         conditions=tree_of(data.test),
         key_figures=KEY_FIGURES,
         links=of_run(run),
+        series_page=_series_page,
         sha256=shared.store.sha256(run),
         stated=stated.read_text().partition(" ")[0] if stated.is_file() else None,
         present=present,
