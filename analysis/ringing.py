@@ -108,7 +108,7 @@ def _pair(
     wave: NDArray[np.complex128] = np.exp((-1 / decay + 2j * np.pi * frequency) * (x - origin))
     basis = np.column_stack((wave.real, wave.imag))
     basis -= smooth @ (smooth.T @ basis)
-    inverse = np.linalg.inv(basis.T @ basis)
+    inverse = np.linalg.pinv(basis.T @ basis)  # of a wave that has faded away nothing is left
     projected = basis.T @ y
     pair = inverse @ projected
     gain = float(projected @ pair)
